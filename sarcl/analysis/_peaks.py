@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..base import validation
 from ..model.image import Image
@@ -44,7 +43,7 @@ def brightest_around(image: Image, position: np.ndarray, reach: float) -> tuple[
         at = best
 
 
-def peak_near(image: Image, near: Any) -> tuple[int, int]:
+def peak_near(image: Image, near: ArrayLike) -> tuple[int, int]:
     """Row and column of the highest peak within two cells of `near`; the cell is the peak's half-power width."""
     near = validation.array("near", near, np.float64, (3,))
     shape = np.array(image.grid.shape)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..base import validation, wgs84
 from ..io import elevation
+from ..io.elevation import Geoid
 from ._grid_index import Axes, Curvilinear
 
 if TYPE_CHECKING:
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
 
 FARTHEST = 1e6  # degrees: more is no place
 HIGHEST = 20e3  # m: the Earth's surface reaches from -10 935 to 8849
-Geoid = str | Path | ArrayLike | Callable[[np.ndarray, np.ndarray], ArrayLike] | None
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..base import validation, wgs84
 from ..io import elevation
-from .elevation import Geoid
+from ..io.elevation import Geoid
 
 
 @dataclass(frozen=True)

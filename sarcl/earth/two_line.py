@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .rotation import SIDEREAL_RATE, rotated, sidereal_time
 from .state_vectors import interpolate
+
+if TYPE_CHECKING:
+    from sgp4.api import Satrec
 
 # Name, columns and limits (first included, last not) of the numbers that SGP4 needs, by line
 FIELDS = {
@@ -36,7 +39,7 @@ class TwoLineElements:
     because they leave out rates of small terms: zero-Doppler times would not be times of closest approach.
     """
 
-    satellite: Any
+    satellite: Satrec
     epoch: np.datetime64
     greenwich: float
     lines: tuple[str, str]
@@ -61,7 +64,7 @@ class TwoLineElements:
         epoch = epoch + np.timedelta64(nanoseconds, "ns")
         return cls(satellite, epoch, sidereal_time(epoch), (line1, line2))
 
-    def __reduce__(self) -> Any:
+    def __reduce__(self) -> tuple[object, tuple[str, str]]:
         """By the lines: sgp4's own object cannot be copied."""
         return type(self).parsed, self.lines
 
@@ -96,7 +99,7 @@ class TwoLineElements:
         )
 
 
-def _check(number: int, line: Any) -> None:
+def _check(number: int, line: object) -> None:
     """ValueError unless `line` is line 1 or 2 of two-line elements, with the right check sum."""
     name = f"line{number}"
     if not isinstance(line, str) or len(line) < 69 or line[:2] != f"{number} ":

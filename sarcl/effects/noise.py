@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -59,7 +58,7 @@ def add_noise(
         raise ValueError(f"nesz is {nesz:g}, wanted a ratio above 0, m^2/m^2; in decibels it is nesz_db={nesz:g}")
     if nesz is not None or nesz_db is not None:
         ratio = number("nesz", nesz, above=0) if nesz is not None else _power(nesz_db)
-        level: Any = ratio * _cells(raw, grid, cell_area) / float((_filtered(raw) ** 2).mean())
+        level: ArrayLike = ratio * _cells(raw, grid, cell_area) / float((_filtered(raw) ** 2).mean())
     elif variance is not None:
         level = number("variance", variance) if ndim("variance", variance) == 0 else variance
     else:
@@ -71,7 +70,7 @@ def add_noise(
     return replace(raw, samples=Noisy(raw.samples, np.sqrt(level), shape, seed))
 
 
-def _power(decibels: Any) -> float:
+def _power(decibels: object) -> float:
     """A power ratio, of dB within those of float32."""
     given = number("nesz_db", decibels)
     if abs(given) > MOST_DECIBELS:
@@ -108,8 +107,9 @@ def complex_gaussian(rows: np.ndarray, n_samples: int, seed: int) -> np.ndarray:
     return np.asarray(radius * np.exp(2j * np.pi * ((second >> np.uint64(11)).astype(np.float64) * 2.0**-53)))
 
 
-def _kelvin(radar: Any) -> float:
+def _kelvin(radar: Radar | None) -> float:
     instance("radar", radar, Radar)
+    assert radar is not None
     if radar.noise_temperature is None:
         raise ValueError("radar has no noise_temperature; give Radar(..., noise_temperature=...) in K")
     return float(radar.noise_temperature)

@@ -3,28 +3,37 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
 WHITE, INK, FAINT = (255, 255, 255), (38, 38, 38), (226, 226, 226)
 
 
+class Axis(NamedTuple):
+    """An axis of a frame: its label, the values at its ends, and the least step of its ticks."""
+
+    label: str
+    low: float
+    high: float
+    least_step: float = 0.0
+
+
 class Axes:
     """White background with a frame of (width, height) pixels for the data, axes, a title above and a caption below.
 
-    across, up   (label, value at the low edge, value at the high edge, least tick step) of the two axes
+    across, up   the two axes
     side         space right of the frame, in units of the font size
     """
 
     def __init__(
-        self, width: int, height: int, across: Any, up: Any, title: str | None, side: float, caption: str
+        self, width: int, height: int, across: Axis, up: Axis, title: str | None, side: float, caption: str
     ) -> None:
         from PIL import Image, ImageDraw, ImageFont
 
         self.unit = u = int(np.clip(round(max(width, height) / 40), 15, 40))
         self.line, self.tick = max(1, round(u / 14)), round(u * 0.4)
-        self.font: Any = ImageFont.load_default(u)
+        self.font = ImageFont.load_default(u)
         self.across, self.up = across, up
         self.across_ticks = self._ticks(across, width, across=True)
         self.up_ticks = self._ticks(up, height, across=False)
@@ -32,7 +41,7 @@ class Axes:
         left = round(2 * self.tick + widest + 2.2 * u)
         top = round(2.6 * u if title else 1.2 * u)
         self.frame = (left, top, left + width, top + height)
-        small: Any = ImageFont.load_default(round(0.85 * u))
+        small = ImageFont.load_default(round(0.85 * u))
         room_below: float = width + round(side * u) + left - u
         lines = wrapped(caption, room_below, small.getlength)
         below = top + height + round(3.9 * u)
@@ -47,14 +56,14 @@ class Axes:
             # The font that comes with Pillow has one dash.
             title = " ".join(str(title).split()).translate(dict.fromkeys(map(ord, "‐‑‒–—−"), "-"))
             room = size[0] - left - 0.5 * u
-            font: Any = ImageFont.load_default(round(1.2 * u))
+            font = ImageFont.load_default(round(1.2 * u))
             if font.getlength(title) > room:
                 font = self.font
             while font.getlength(title) > room:
                 title = title[:-2].rstrip() + "…"
             self.draw.text((left, top - round(0.75 * u)), title, INK, font, anchor="ls")
 
-    def _ticks(self, axis: Any, length: int, across: bool) -> tuple[float, list[float]]:
+    def _ticks(self, axis: Axis, length: int, across: bool) -> tuple[float, list[float]]:
         """(step, values) of an axis `length` pixels long, as many as its labels leave room for."""
         _, low, high, least = axis
         most = max(length / (4.2 * self.unit), 5.0)
@@ -113,13 +122,17 @@ def wrapped(text: str, room: float, length: Callable[[str], float]) -> list[str]
 
 
 def image_axis(
-    n: int, along: int, spacing: Any, origin: Any = (0.0, 0.0), names: Any = ("y", "x")
-) -> tuple[str, float, float, float]:
-    """(label, value at the low edge, value at the high edge, least tick step) of axis `along`."""
+    n: int,
+    along: int,
+    spacing: tuple[float, float] | None,
+    origin: tuple[float, float] = (0.0, 0.0),
+    names: tuple[str, str] = ("y", "x"),
+) -> Axis:
+    """The axis `along` of an image of n pixels: 0 of its rows, 1 of its columns."""
     if spacing is None:
-        return ("row", "column")[along], -0.5, n - 0.5, 1.0
+        return Axis(("row", "column")[along], -0.5, n - 0.5, 1.0)
     low = origin[along] + (-(n // 2) - 0.5) * spacing[along]
-    return f"{names[along]} (m)", low, low + n * spacing[along], 0.0
+    return Axis(f"{names[along]} (m)", low, low + n * spacing[along])
 
 
 def ticks_between(low: float, high: float, most: float, least: float = 0.0) -> tuple[float, list[float]]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..base import validation
-from ._axes import Axes
+from ._axes import Axes, Axis
 
 if TYPE_CHECKING:
     from PIL.Image import Image as Picture
@@ -30,8 +30,8 @@ def curves(
         raise ValueError(f"floor_db is {floor_db:g}; the frame ends that many dB below the peak: give e.g. -50")
     low, high = floor_db, -0.04 * floor_db
     left, right = (float(pick([pick(x) for _, x, _ in curves])) for pick in (np.min, np.max))
-    across = (x_name, left, right, 0.0)
-    drawing = Axes(WIDTH, HEIGHT, across, ("relative to the peak (dB)", low, high, 0.0), title, 1.5, caption)
+    across = Axis(x_name, left, right)
+    drawing = Axes(WIDTH, HEIGHT, across, Axis("relative to the peak (dB)", low, high), title, 1.5, caption)
     drawing.axes(grid=True)
     for i, (name, x, db) in enumerate(curves):
         canvas = Image.new("L", (WIDTH * FINE, HEIGHT * FINE))

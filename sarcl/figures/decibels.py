@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from ..base import validation
 from ..base.version import __version__
-from ._axes import INK, Axes, image_axis, number, ticks_between
+from ._axes import INK, Axes, Axis, image_axis, number, ticks_between
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
     from PIL.Image import Image as Picture
+
+    from ..base.types import PathLike
 
 SMALLEST, LARGEST = 500, 2400  # pixels along the longer side of what is drawn
 THINNEST = 1 / 6  # smallest ratio of shorter to longer side; a longer strip is stretched across
@@ -26,8 +29,8 @@ FILLED, FAINTEST, OBJECT = 25.0, 40.0, 30.0
 
 
 def picture(
-    db: Any,
-    spacing: Any = None,
+    db: ArrayLike,
+    spacing: float | tuple[float, float] | None = None,
     floor_db: float = -50.0,
     title: str | None = None,
     *,
@@ -67,7 +70,7 @@ def picture(
         raise ValueError(f"db[{at[0]}, {at[1]}] is {db[at]}; decibels are finite, or -inf for no signal")
     check_scale(floor_db, top_db, percentile)
     if spacing is not None:
-        dy, dx = spacing if np.ndim(spacing) else (spacing, spacing)
+        dy, dx = cast(tuple[float, float], spacing if np.ndim(spacing) else (spacing, spacing))
         spacing = validation.number("spacing[0]", dy, above=0), validation.number("spacing[1]", dx, above=0)
     draw = _line_plot if 1 in db.shape and db.size > 1 else _grey_image
     return draw(db, (spacing, origin, names), floor_db, top_db, percentile, title, zero)
@@ -114,7 +117,7 @@ def white_level(db: np.ndarray, percentile: float | None = None) -> float:
     return float(white)
 
 
-def write_png(picture: Picture, path: Any) -> None:
+def write_png(picture: Picture, path: PathLike) -> None:
     """Write a PNG that appears whole or not at all; raises what `output_paths.check_writable` raises, and
     FileExistsError while another run writes the same path.
 
@@ -212,11 +215,11 @@ def _grey_image(
 
     height, width = drawn_shape(db.shape, axes[0])
     across, up = image_axis(db.shape[1], 1, *axes), image_axis(db.shape[0], 0, *axes)
-    ratio = (up[2] - up[1]) / (across[2] - across[1])
+    ratio = (up.high - up.low) / (across.high - across.low)
     if ratio < THINNEST:
-        up = (up[0] + ", stretched", *up[1:])
+        up = up._replace(label=f"{up.label}, stretched")
     elif 1 / ratio < THINNEST:
-        across = (across[0] + ", stretched", *across[1:])
+        across = across._replace(label=f"{across.label}, stretched")
     drawn = resampled(db, (height, width))
     white = white_level(drawn, percentile) if top_db is None else float(top_db)
     how = "given" if top_db is not None else _percentile_text(percentile)
@@ -281,7 +284,7 @@ def _line_plot(
     caption = "No sample has a signal." if peak == -np.inf else f"Maximum: {_decibels(peak)}."
     if zero and peak > -np.inf:
         caption += f" 0 dB: {zero}."
-    up = (f"relative to {name} (dB)", floor_db, -0.04 * floor_db, 0.0)
+    up = Axis(f"relative to {name} (dB)", floor_db, -0.04 * floor_db)
     drawing = Axes(width, height, axis, up, title, 1.5, caption)
     drawing.axes(grid=True)
     relative = np.full(values.size, 2 * floor_db) if peak == -np.inf else values[0] - white

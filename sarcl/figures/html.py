@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..base.version import __version__
 from . import plots
@@ -68,7 +69,7 @@ def plot(
 
 
 def picture(
-    db: Any, x: tuple[float, float], y: tuple[float, float], x_name: str, y_name: str, caption: str, *,
+    db: ArrayLike, x: tuple[float, float], y: tuple[float, float], x_name: str, y_name: str, caption: str, *,
     floor_db: float = -40.0, box: tuple[float, float] | None = None, percentile: float = 100.0,
     lines: Sequence[tuple[str, Any, Any]] = (), unit: str = "dB", equal: bool = False,
 ) -> Block:  # fmt: skip

@@ -7,13 +7,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from io import BytesIO
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
+    from numpy.typing import ArrayLike
 
 SIZE, DPI = (5.6, 4.0), 120  # of a figure, inches; pixels per inch
 LEFT, BOTTOM, WIDTH, HEIGHT = 0.14, 0.13, 0.83, 0.83  # of the axes, relative to the figure
@@ -50,7 +53,7 @@ def png(figure: Figure, colours: int = 64) -> bytes:
     """A figure of `figure` as a PNG file of so many colours, 256 at most."""
     from PIL import Image
 
-    canvas: Any = figure.canvas
+    canvas = cast("FigureCanvasAgg", figure.canvas)
     canvas.draw()
     pixels = Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3])
     file = BytesIO()
@@ -106,7 +109,7 @@ def names(axes: Axes, x_name: str, y_name: str) -> None:
     axes.grid(alpha=0.3)
 
 
-def decades(axis: Any) -> None:
+def decades(axis: Axis) -> None:
     """Ticks of a logarithmic axis at 1, 2 and 5 times powers of ten, written as numbers."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
@@ -116,7 +119,7 @@ def decades(axis: Any) -> None:
 
 
 def picture(
-    db: Any, x: tuple[float, float], y: tuple[float, float], x_name: str, y_name: str, *, floor_db: float,
+    db: ArrayLike, x: tuple[float, float], y: tuple[float, float], x_name: str, y_name: str, *, floor_db: float,
     box: tuple[float, float] | None = None, lines: Sequence[tuple[str, Any, Any]] = (), unit: str = "dB",
     equal: bool = False,
 ) -> bytes:  # fmt: skip

@@ -16,9 +16,13 @@ import zlib
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
+
+if TYPE_CHECKING:
+    import h5py
+    from numpy.typing import ArrayLike, DTypeLike
 
 MAGIC = b"sarcl checksums 1\n"
 END = 12 + len(MAGIC)  # bytes after the text
@@ -51,7 +55,7 @@ class Checksums:
     blocks: list[int] = field(default_factory=list)
 
 
-def rows_per_block(shape: tuple[int, ...], dtype: Any) -> int:
+def rows_per_block(shape: tuple[int, ...], dtype: DTypeLike) -> int:
     """Rows of a block, so that it has about BLOCK_BYTES."""
     return max(1, BLOCK_BYTES // max(1, int(np.prod(shape[1:], dtype=np.int64)) * np.dtype(dtype).itemsize))
 
@@ -59,14 +63,14 @@ def rows_per_block(shape: tuple[int, ...], dtype: Any) -> int:
 class RunningSums:
     """CRCs of the blocks of rows that are being written, without reading them again where rows come in order."""
 
-    def __init__(self, shape: tuple[int, ...], dtype: Any) -> None:
+    def __init__(self, shape: tuple[int, ...], dtype: DTypeLike) -> None:
         self.shape, self.dtype = shape, np.dtype(dtype)
         self.step = rows_per_block(shape, dtype)
         n = -(-shape[0] // self.step)
         self.sums = np.zeros(n, np.uint32)
         self._rows = np.zeros(n, np.int64)  # of each block, those that its CRC covers; -1: written in another order
 
-    def wrote(self, at: Any, values: Any) -> None:
+    def wrote(self, at: object, values: ArrayLike) -> None:
         """Rows `at` were given these values, as numpy assigns them."""
         first, given = at[0] if isinstance(at, tuple) and at else at, np.asarray(values)
         # HDF5 converts other types, and may write other NaNs than numpy
@@ -86,7 +90,7 @@ class RunningSums:
             else:
                 self._rows[block] = -1
 
-    def of(self, dataset: Any) -> list[int]:
+    def of(self, dataset: h5py.Dataset) -> list[int]:
         """All CRCs; blocks that were not written in order are read from the dataset."""
         for block in range(len(self.sums)):
             low, high = block * self.step, min((block + 1) * self.step, self.shape[0])
@@ -99,13 +103,13 @@ def crc_of(values: np.ndarray, start: int = 0) -> int:
     return zlib.crc32(np.ascontiguousarray(values).reshape(-1).view(np.uint8).data, start)
 
 
-def layout(file: Any, size: int, rows: str, sums: RunningSums | None) -> Checksums:
+def layout(file: h5py.File, size: int, rows: str, sums: RunningSums | None) -> Checksums:
     """Where the arrays of an open HDF5 file lie, and the CRCs of its rows; `complete` adds the others."""
     import h5py
 
     arrays: list[tuple[str, int, int, int]] = []
 
-    def visit(name: str, found: Any) -> None:
+    def visit(name: str, found: h5py.Dataset) -> None:
         if isinstance(found, h5py.Dataset) and name != rows and (at := found.id.get_offset()) is not None:
             arrays.append((name, int(at), int(found.id.get_storage_size()), 0))
 

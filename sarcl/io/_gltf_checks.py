@@ -59,15 +59,15 @@ def check(data: bytes, what: str) -> None:
                     raise ValueError(f"{what} has normalized whole numbers as positions, {TAKE}; {AGAIN} quantization")
 
 
-def _list(value: Any) -> list[Any]:
+def _list(value: object) -> list[Any]:
     return value if isinstance(value, list) else []
 
 
-def _object(value: Any) -> dict[str, Any]:
+def _object(value: object) -> dict[str, Any]:
     return value if isinstance(value, dict) else {}
 
 
-def _objects(value: Any) -> Iterator[dict[str, Any]]:
+def _objects(value: object) -> Iterator[dict[str, Any]]:
     """The objects of a list, an empty one for anything else, so that numbers of others stay as they are."""
     for one in _list(value):
         yield _object(one)

@@ -34,16 +34,17 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from ..base import constants, validation
+from ..base.types import PathLike
 from . import _mat5_checks
-from .formats import Make
+from .formats import Make, T
 
 
-def load(path: Any, make: Make, autofocus: bool = False) -> Any:
+def load(path: PathLike, make: Make[T], autofocus: bool = False) -> T:
     """make("phase history", fields) of one Gotcha file.
 
     samples          complex64 (n_pulses, n_frequencies)
@@ -124,7 +125,7 @@ def _struct(path: Path) -> np.void:
     return data.reshape(-1)[0]
 
 
-def _field(path: Path, struct: np.void, name: str, dtype: Any, shape: tuple[int | str, ...]) -> np.ndarray:
+def _field(path: Path, struct: np.void, name: str, dtype: DTypeLike, shape: tuple[int | str, ...]) -> np.ndarray:
     if name not in (struct.dtype.names or ()):
         have = ", ".join(struct.dtype.names or ()) or "nothing"
         raise ValueError(f"{path.name}: 'data' has no field {name!r}; it has {have}: is this a Gotcha file?")

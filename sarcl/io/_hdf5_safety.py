@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from typing import Any
+from typing import TYPE_CHECKING
 
 from ..base.text import size_text
+
+if TYPE_CHECKING:
+    import h5py
+
+    from ..base.types import PathLike
 
 PATIENCE = 20.0  # s for the tables of a file; they are read in milliseconds
 DEFLATED = 1032  # bytes that one compressed byte may hold
@@ -28,7 +33,7 @@ class Refused(Exception):
     """The message says why the file is not read, and follows its name."""
 
 
-def check_readable(path: Any) -> None:
+def check_readable(path: PathLike) -> None:
     """Refused where HDF5 does not come to an end with a file, or crashes: tried in another process.
 
     For files without checksums. Their damaged tables make HDF5 wait for ever, which nothing in this process can end.
@@ -49,14 +54,14 @@ def check_readable(path: Any) -> None:
         raise Refused(f"HDF5 crashes on its tables (signal {-done.returncode})")
 
 
-def check_contents(file: Any, file_bytes: int, external: bool, how: str = "read(..., external=True)") -> None:
+def check_contents(file: h5py.File, file_bytes: int, external: bool, how: str = "read(..., external=True)") -> None:
     """Refused where an open file leads into other files, unless `external`, or declares more than it has.
 
     how  to allow it, for the message
     """
     import h5py
 
-    def visit(group: Any, depth: int) -> None:
+    def visit(group: h5py.Group, depth: int) -> None:
         if depth > 8:
             raise Refused("has groups within groups to a depth that sarcl never writes; save it again with sarcl")
         for name in group:
@@ -77,7 +82,7 @@ def check_contents(file: Any, file_bytes: int, external: bool, how: str = "read(
                 "for files that you trust"
             )
 
-    def look(name: str, found: Any) -> None:
+    def look(name: str, found: h5py.Dataset) -> None:
         if found.is_virtual:
             leads(f"{name} is virtual", ", ".join(sorted({s.file_name for s in found.virtual_sources()})))
             return

@@ -12,7 +12,10 @@ import stat
 import time
 import zlib
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ..base.types import PathLike
 
 log = logging.getLogger(__name__)
 
@@ -43,7 +46,7 @@ class Part:
             os.close(self._lock)  # another process took it for a leftover before it was locked
 
     @classmethod
-    def begun(cls, target: Path, shown: Any, alone: bool) -> Part:
+    def begun(cls, target: Path, shown: PathLike, alone: bool) -> Part:
         """A new file, after the removal of files beside it that no living process owns.
 
         alone  FileExistsError, which names `shown`, while another process has a file for the same target

@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Literal
 
 import numpy as np
 
@@ -20,7 +20,12 @@ TYPES = {
     "int64": "i8", "uint64": "u8", "float16": "f2", "float32": "f4", "float64": "f8",
 }  # fmt: skip
 HEADER = re.compile(rb"ply[ \t]*\r?\n((?:.*?\n)??)[ \t]*end_header[ \t]*(?:\r?\n|$)", re.DOTALL)
-ORDER = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}  # of bytes; text has none
+Order = Literal["", "<", ">"]
+ORDER: dict[str, Order] = {
+    "ascii": "",
+    "binary_little_endian": "<",
+    "binary_big_endian": ">",
+}  # of bytes; text has none
 FACES = ("vertex_index", "vertex_indices")
 PIECE = 2**18  # numbers read at a time, so that what is made on the way to them stays small
 LONGEST = 400  # characters of a number as text: the largest of float64 has 309 digits before its point
@@ -74,9 +79,10 @@ def read(data: bytes, what: str) -> tuple[np.ndarray, np.ndarray]:
     return vertices, _triangles(named["face"], body, vertices, what)
 
 
-def _header(text: str, what: str) -> tuple[str, list[_Element]]:
+def _header(text: str, what: str) -> tuple[Order, list[_Element]]:
     """(order of bytes, "" for text; the elements)."""
-    order, elements = None, list[_Element]()
+    order: Order | None = None
+    elements: list[_Element] = []
     for line in text.split("\n"):  # str.splitlines also splits within characters of comments, as "Å" in UTF-8
         words = line.split()
         if not words or words[0] in ("comment", "obj_info"):
@@ -154,7 +160,7 @@ class _Binary:
 
     unit = "bytes"
 
-    def __init__(self, body: bytes, order: Any) -> None:
+    def __init__(self, body: bytes, order: Literal["<", ">"]) -> None:
         self.body, self.order, self.size = body, order, len(body)
         self.bytes = np.frombuffer(body, np.uint8)
 

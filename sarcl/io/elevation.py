@@ -5,16 +5,22 @@ from __future__ import annotations
 import logging
 import re
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..base import arguments, errors, validation, wgs84
 from . import _other_files, input_paths
+
+if TYPE_CHECKING:
+    from rasterio import DatasetReader
+
+    from ..base.types import PathLike
 
 log = logging.getLogger(__name__)
 
@@ -22,6 +28,7 @@ MOST_POINTS = 25_000_000  # a point makes two facets; Scene.split has the same l
 LOWEST, HIGHEST = -1000.0, 9000.0  # m; land lies between -430 and 8849
 METRES = {"metre": 1.0, "meter": 1.0, "m": 1.0, "foot": 0.3048, "us survey foot": 1200 / 3937}
 WGS84 = "EPSG:4326"
+Geoid = str | Path | ArrayLike | Callable[[np.ndarray, np.ndarray], ArrayLike] | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,8 +41,14 @@ class Tile:
 
 
 def load(
-    path: Any, *, bounds: Any = None, heights: Any = None, geoid: Any = None, nodata: Any = None, external: Any = False
-) -> Tile:  # fmt: skip
+    path: PathLike,
+    *,
+    bounds: ArrayLike | None = None,
+    heights: str | None = None,
+    geoid: Geoid = None,
+    nodata: float | None = None,
+    external: bool = False,
+) -> Tile:
     """Points of an elevation model within bounds; arguments and errors as in Scene.from_dem."""
     path = arguments.path("path", path)
     name = f"DEM {path.name!r}"
@@ -56,7 +69,7 @@ def load(
     return Tile(longitude, latitude, height)
 
 
-def place(tile: Tile, frame: Any, center: Any) -> tuple[np.ndarray, np.ndarray]:
+def place(tile: Tile, frame: str, center: ArrayLike | None) -> tuple[np.ndarray, np.ndarray]:
     """Points and the ellipsoid's unit normals there, both (n_rows, n_columns, 3), in a frame of Scene.from_dem."""
     validation.choice("frame", frame, ("local", "ecef"))
     if frame == "ecef":
@@ -69,7 +82,7 @@ def place(tile: Tile, frame: Any, center: Any) -> tuple[np.ndarray, np.ndarray]:
     return points, wgs84.up(tile.longitude, tile.latitude) @ axes.T
 
 
-def local_frame(tile: Tile, center: Any) -> tuple[np.ndarray, np.ndarray]:
+def local_frame(tile: Tile, center: ArrayLike | None) -> tuple[np.ndarray, np.ndarray]:
     """Origin, m (3,), and axes east, north, up (3, 3) of the local frame of Scene.from_dem, in Earth-centred axes."""
     longitudes = tile.longitude
     if np.ptp(longitudes) > 180:  # across the antimeridian: counted from the first one
@@ -92,7 +105,7 @@ def local_frame(tile: Tile, center: Any) -> tuple[np.ndarray, np.ndarray]:
 
 
 @contextmanager
-def _opened(path: Path, name: str, external: bool) -> Iterator[Any]:
+def _opened(path: Path, name: str, external: bool) -> Iterator[DatasetReader]:
     """A raster, open for reading."""
     is_file = not path.is_dir()  # some formats are folders
     if is_file:
@@ -117,7 +130,7 @@ def _opened(path: Path, name: str, external: bool) -> Iterator[Any]:
             raise ValueError(f"{name} cannot be read ({exc}): it is damaged or no raster") from exc
 
 
-def _check_place(file: Any, name: str) -> None:
+def _check_place(file: DatasetReader, name: str) -> None:
     if file.crs is None or file.transform.is_identity:
         what = "CRS" if file.crs is None else "georeferencing"
         raise ValueError(
@@ -132,7 +145,7 @@ def _check_place(file: Any, name: str) -> None:
         raise ValueError(f"{name} has {file.height} x {file.width} points; a cell needs two in either direction")
 
 
-def _reference(file: Any, name: str, heights: Any, geoid: Any) -> str:
+def _reference(file: DatasetReader, name: str, heights: str | None, geoid: Geoid) -> str:
     """The geoid that heights are above, by its name; "" for the ellipsoid."""
     wkt = file.crs.to_wkt(version="WKT2_2019")
     vertical = re.search(r'VERTCRS\["([^"]+)"', wkt)
@@ -163,7 +176,7 @@ def _reference(file: Any, name: str, heights: Any, geoid: Any) -> str:
     return above
 
 
-def _window(file: Any, name: str, bounds: Any) -> tuple[np.ndarray, np.ndarray]:
+def _window(file: DatasetReader, name: str, bounds: ArrayLike | None) -> tuple[np.ndarray, np.ndarray]:
     """Rows and columns of the points within bounds."""
     if bounds is None:
         low, high = np.zeros(2), np.array([file.height, file.width]) - 1
@@ -198,7 +211,7 @@ def _window(file: Any, name: str, bounds: Any) -> tuple[np.ndarray, np.ndarray]:
     return rows, columns
 
 
-def _heights(file: Any, name: str, rows: np.ndarray, columns: np.ndarray, nodata: Any) -> np.ndarray:
+def _heights(file: DatasetReader, name: str, rows: np.ndarray, columns: np.ndarray, nodata: float | None) -> np.ndarray:
     """Heights in metres, NaN where there are none."""
     from rasterio.windows import Window
 
@@ -225,7 +238,7 @@ def _heights(file: Any, name: str, rows: np.ndarray, columns: np.ndarray, nodata
     return np.where(missing, np.nan, height)
 
 
-def _places(file: Any, name: str, rows: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _places(file: DatasetReader, name: str, rows: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Longitude and latitude of points, degrees on WGS84 (n_rows, n_columns) each."""
     column, row = np.meshgrid(columns + 0.5, rows + 0.5)
     t = file.transform
@@ -248,7 +261,7 @@ def _places(file: Any, name: str, rows: np.ndarray, columns: np.ndarray) -> tupl
     return longitude, latitude
 
 
-def _warped(file: Any) -> bool:
+def _warped(file: DatasetReader) -> bool:
     """True where coordinates are not degrees on WGS84 already."""
     wkt = file.crs.to_wkt()
     degrees = re.search(r'GEOGCS\[.*?UNIT\["degree"', wkt) is not None
@@ -256,14 +269,14 @@ def _warped(file: Any) -> bool:
 
 
 def undulation(
-    geoid: Any, longitude: np.ndarray, latitude: np.ndarray, name: str, above: str, external: bool = False
+    geoid: Geoid, longitude: np.ndarray, latitude: np.ndarray, name: str, above: str, external: bool = False
 ) -> np.ndarray:  # fmt: skip
     """Height above the ellipsoid, m, of the geoid called `above`, at points, degrees (n_rows, n_columns)."""
     if isinstance(geoid, (str, Path)):
         return _raster(Path(geoid), longitude, latitude, external)
     if callable(geoid):
         geoid = geoid(longitude, latitude)
-    if np.ndim(geoid) == 0:
+    if geoid is None or np.ndim(geoid) == 0:
         value = validation.number("geoid", geoid)
         if value == 0:
             errors.warn(

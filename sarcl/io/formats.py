@@ -16,14 +16,21 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from importlib import import_module
 from pathlib import Path
-from typing import Any, Literal
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from ..base import arguments
 from . import input_paths
 
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+    from ..base.types import PathLike
+
 Kind = Literal["phase history", "image"]
 Written = Literal["phase history", "image", "picture"]
-Make = Callable[[Kind, Mapping[str, Any]], Any]
+T = TypeVar("T")
+Make = Callable[[Kind, Mapping[str, Any]], T]
 
 
 @dataclass(frozen=True)
@@ -46,7 +53,7 @@ class Format:
     by_blocks: bool = False
 
     @property
-    def functions(self) -> Any:
+    def functions(self) -> ModuleType:
         """The file of this folder that reads and writes the format."""
         return import_module(f".{self.file}", __package__)
 
@@ -71,7 +78,7 @@ NOT_READ = {  # first bytes of files that are often met, and what to say of them
 }
 
 
-def load(path: Path, make: Make, autofocus: bool = False, external: bool = False) -> Any:
+def load(path: Path, make: Make[T], autofocus: bool = False, external: bool = False) -> T:
     """What make(kind, fields) makes of a file, whose format follows from its first bytes.
 
     external  HDF5 files may lead into other files
@@ -108,19 +115,19 @@ def _listed(names: list[str], word: str) -> str:
     return f" {word} ".join([*([", ".join(names[:-1])] if names[1:] else []), names[-1]])
 
 
-def named(path: Any, among: list[Format]) -> Format | None:
+def named(path: PathLike, among: list[Format]) -> Format | None:
     """The format, of those given, that has the suffix of a path."""
     ending = Path(path).suffix.lower()
     return next((f for f in among if ending in f.endings), None)
 
 
-def ending_of(path: Any) -> str:
+def ending_of(path: PathLike) -> str:
     """How the name of a path ends, for messages: that it is a folder, its suffix, or that it has none."""
     suffix = Path(path).suffix
     return "is a folder" if Path(path).is_dir() else f"ends in {suffix!r}" if suffix else "has no ending"
 
 
-def writer_functions(path: Any, kind: Written) -> Any:
+def writer_functions(path: PathLike, kind: Written) -> ModuleType:
     """Functions of the format in which `path` is written, by its suffix; ValueError where no format is written so."""
     among, path = writing(kind), arguments.path("path", path)
     form = named(path, among)
@@ -130,6 +137,6 @@ def writer_functions(path: Any, kind: Written) -> Any:
     return form.functions
 
 
-def fields_of(value: Any) -> dict[str, Any]:
+def fields_of(value: DataclassInstance) -> dict[str, Any]:
     """The fields of a dataclass by name, as the writers take them; arrays are not copied."""
     return {field.name: getattr(value, field.name) for field in fields(value)}

@@ -6,7 +6,7 @@ import io
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -22,6 +22,9 @@ from . import (
     _ply,
     input_paths,
 )
+
+if TYPE_CHECKING:
+    import trimesh
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +42,7 @@ class Mesh:
     unit: float | None = None
 
 
-def load(mesh: Any, repair: bool = True, external: bool = False) -> Mesh:
+def load(mesh: object, repair: bool = True, external: bool = False) -> Mesh:
     """A mesh file, a trimesh.Trimesh or a trimesh.Scene, its parts in place.
 
     repair  drop repeated faces, give neighbours one winding, face closed bodies outwards, but for walls of cavities in
@@ -70,7 +73,7 @@ def load(mesh: Any, repair: bool = True, external: bool = False) -> Mesh:
     return Mesh(vertices[faces], part[kept], names, closed, _unit(mesh, what))
 
 
-def _unit(scene: Any, what: str) -> float | None:
+def _unit(scene: trimesh.Scene, what: str) -> float | None:
     """Metres per unit of a trimesh.Scene, None where it names no unit; ValueError where its parts have several."""
     from trimesh.units import unit_conversion
 
@@ -83,7 +86,7 @@ def _unit(scene: Any, what: str) -> float | None:
     return found.pop()
 
 
-def _read(path: Path, what: str, external: bool) -> Any:
+def _read(path: Path, what: str, external: bool) -> trimesh.Scene:
     """The trimesh.Scene of a file, or of all meshes in an archive."""
     import trimesh
 
@@ -102,13 +105,15 @@ def _read(path: Path, what: str, external: bool) -> Any:
     scenes = []
     for name in names:
         held = {other: io.BytesIO(data) for other, data in _mesh_archive.beside(files, name).items()}
-        others: Any = trimesh.resolvers.ZipResolver(held)
+        others = trimesh.resolvers.ZipResolver(held)
         kind, of_it = Path(name).suffix.lower(), f"{what}, its file {name!r:.100}"
         scenes.append(_scene(files[name], kind, None, of_it, others))
     return trimesh.scene.scene.append_scenes(scenes) if len(scenes) > 1 else scenes[0]
 
 
-def _scene(data: bytes, kind: str, path: Path | None, what: str, others: Any) -> Any:
+def _scene(
+    data: bytes, kind: str, path: Path | None, what: str, others: trimesh.resolvers.Resolver | _other_files.Resolver
+) -> trimesh.Scene:
     """A trimesh.Scene of the bytes of a mesh file; ValueError for what would be left out or covered wrongly.
 
     path  gives the mesh its name, where it is a file;  others  gives trimesh the files that this one names
@@ -135,7 +140,10 @@ def _scene(data: bytes, kind: str, path: Path | None, what: str, others: Any) ->
         collada = _collada_checks.opened(data) if kind == ".dae" else None
         # process=False: merging and reordering corners is not needed and hides what the file holds
         made = trimesh.load_scene(
-            io.BytesIO(data), file_type=str(path.absolute()) if path else kind[1:], process=False, resolver=others
+            io.BytesIO(data),
+            file_type=str(path.absolute()) if path else kind[1:],
+            process=False,
+            resolver=cast(trimesh.resolvers.Resolver, others),
         )
     except Exception as exc:
         if isinstance(others, _other_files.Resolver):
@@ -161,7 +169,7 @@ def _check_refused(others: _other_files.Resolver, what: str) -> None:
         )
 
 
-def _parts(scene: Any, what: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[tuple[str, ...]]]:
+def _parts(scene: trimesh.Scene, what: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[tuple[str, ...]]]:
     """Corners (n, 3), faces (k, 3), part of each face (k,), and the names of the parts."""
     import trimesh
 
@@ -188,7 +196,7 @@ def _parts(scene: Any, what: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, l
     return np.concatenate(vertices), np.concatenate(faces), np.concatenate(part), names
 
 
-def part_materials(material: Any, mesh: Mesh) -> dict[str, Any]:
+def part_materials(material: object, mesh: Mesh) -> dict[str, Any]:
     """Arguments of Scene.facets: one material for all, or {part: material} with "*" for the rest.
 
     A part goes by its node's name before its geometry's before its material's. ValueError names the parts there

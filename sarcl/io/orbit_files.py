@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 
@@ -87,7 +87,7 @@ def load(path: Path) -> tuple[np.datetime64, np.ndarray, np.ndarray, np.ndarray]
     return dates[0], seconds, positions, velocities
 
 
-def _text(name: str, state: Any, tag: str) -> str:
+def _text(name: str, state: ElementTree.Element, tag: str) -> str:
     text = state.findtext(tag)
     if text is None:
         raise ValueError(f"{name} has a state vector without <{tag}>: it is damaged")
@@ -96,7 +96,7 @@ def _text(name: str, state: Any, tag: str) -> str:
     return str(text).strip()
 
 
-def _date(name: str, layout: _Layout, state: Any) -> np.datetime64:
+def _date(name: str, layout: _Layout, state: ElementTree.Element) -> np.datetime64:
     text = _text(name, state, layout.time).removeprefix("UTC=").removesuffix("Z")
     if not re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d{1,9})?", text):
         raise ValueError(f"{name} has the time {text!r}; wanted UTC such as 2021-12-23T05:10:21.029300")
@@ -111,8 +111,9 @@ def _date(name: str, layout: _Layout, state: Any) -> np.datetime64:
         raise ValueError(f"{name} has the time {text!r}, which {why}") from None
 
 
-def _number(name: str, state: Any, tag: str) -> float:
-    text, unit = _text(name, state, tag), state.find(tag).get("unit")
+def _number(name: str, state: ElementTree.Element, tag: str) -> float:
+    text = _text(name, state, tag)
+    unit = next(state.iterfind(tag)).get("unit")
     if unit not in (None, "m", "m/s"):
         raise ValueError(f"{name} has <{tag}> in {unit!r}; wanted m and m/s")
     if not re.fullmatch(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", text):

@@ -12,13 +12,19 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from . import _checksums, _hdf5_safety, hdf5
 from ._partial_hdf5 import Unfinished
-from .formats import Kind, Make
+from .formats import Kind, Make, T
+
+if TYPE_CHECKING:
+    import h5py
+    from numpy.typing import DTypeLike
+
+    from ..base.types import PathLike
 
 FILE_BYTES = 2**17  # bytes of all that is no row and no array: a waveform, a report, HDF5's own tables
 ROW_BYTES = 130  # bytes per row besides its samples: its geometry, numbers and the name of its polarisation
@@ -26,7 +32,7 @@ ROW_BYTES = 130  # bytes per row besides its samples: its geometry, numbers and 
 ROWS: dict[str, tuple[Kind, str]] = {"phase_history": ("phase history", "samples"), "image": ("image", "data")}
 
 
-def load(path: Any, make: Make, autofocus: bool = False, external: bool = False) -> Any:
+def load(path: PathLike, make: Make[T], autofocus: bool = False, external: bool = False) -> T:
     """make(kind, fields) of a file of sarcl's; samples or data stay in it as an h5py.Dataset that keeps it open.
 
     A group of the file is a mapping among the fields; what the file leaves out is no field. autofocus has no effect.
@@ -68,7 +74,7 @@ def load(path: Any, make: Make, autofocus: bool = False, external: bool = False)
         raise
 
 
-def open_rows(path: Any, name: str) -> Any:
+def open_rows(path: PathLike, name: str) -> h5py.Dataset:
     """The dataset `name` of a file of sarcl's, or of another HDF5 file, with the checksums that the file has for it.
 
     ValueError where the file is damaged, OSError or KeyError where there is no such file or dataset.
@@ -80,7 +86,7 @@ def open_rows(path: Any, name: str) -> Any:
     )
 
 
-def _checked(path: Any) -> _checksums.Checksums | None:
+def _checked(path: PathLike) -> _checksums.Checksums | None:
     """Checksums of a file after a check of all but its rows; one without checksums is tried in another process."""
     try:
         sums = _checksums.of(Path(path))
@@ -93,7 +99,7 @@ def _checked(path: Any) -> _checksums.Checksums | None:
     return sums
 
 
-def _opened(path: Any) -> Any:
+def _opened(path: PathLike) -> h5py.File:
     import h5py
 
     try:
@@ -103,13 +109,13 @@ def _opened(path: Any) -> Any:
         raise ValueError(f"{str(path)!r} is {what} ({exc}); copy it again or give a file saved by sarcl") from None
 
 
-def _with_checksums(dataset: Any, sums: _checksums.Checksums) -> Any:
+def _with_checksums(dataset: h5py.Dataset, sums: _checksums.Checksums) -> h5py.Dataset:
     from ._checked_rows import CheckedRows
 
     return CheckedRows(dataset, sums)
 
 
-def job_of(path: Any) -> str | None:
+def job_of(path: PathLike) -> str | None:
     """The mark of the job that made an image file; None where there is no such file, or no mark in a whole file."""
     try:
         _checked(path)
@@ -134,7 +140,9 @@ class ImageWriter:
     writes the same path.
     """
 
-    def __init__(self, path: Any, grid: Mapping[str, Any], dtype: Any = np.complex64, resumes: bool = False) -> None:
+    def __init__(
+        self, path: PathLike, grid: Mapping[str, Any], dtype: DTypeLike = np.complex64, resumes: bool = False
+    ) -> None:
         self.path, shape = Path(path), tuple(grid["shape"])
         self._made = Unfinished(path, "image", math.prod(shape) * np.dtype(dtype).itemsize, resumes)
         try:
@@ -180,7 +188,7 @@ class ImageWriter:
 class EchoWriter:
     """A file of echoes in the making: `samples` (n_rows, n_samples), zero until written; then `close` or `abandon`."""
 
-    def __init__(self, path: Any, n_rows: int, n_samples: int, dtype: Any = np.complex64) -> None:
+    def __init__(self, path: PathLike, n_rows: int, n_samples: int, dtype: DTypeLike = np.complex64) -> None:
         nbytes = n_rows * n_samples * np.dtype(dtype).itemsize
         self.path, self._row_bytes = Path(path), n_rows * ROW_BYTES
         self._made = Unfinished(path, "phase_history", nbytes + self._row_bytes)
@@ -208,7 +216,7 @@ class EchoWriter:
         self._made.abandon()
 
 
-def _put_fields(file: Any, fields: Mapping[str, Any]) -> None:
+def _put_fields(file: h5py.File, fields: Mapping[str, Any]) -> None:
     """Write fields in the order given: a mapping as a group, the report as JSON, any other value as `hdf5.put` does."""
     for name, value in fields.items():
         if name == "report":
@@ -219,7 +227,7 @@ def _put_fields(file: Any, fields: Mapping[str, Any]) -> None:
             hdf5.put(file, name, value)
 
 
-def _put_group(file: Any, name: str, fields: Mapping[str, Any]) -> None:
+def _put_group(file: h5py.File, name: str, fields: Mapping[str, Any]) -> None:
     group = file.create_group(name)
     for field, value in fields.items():
         hdf5.put(group, field, value)

@@ -53,7 +53,7 @@ def too_deep(name: str) -> ValueError:
     return ValueError(f"{name}: arrays or tables lie hundreds deep in each other; write them flat")
 
 
-def _integers(path: Path, value: Any) -> Iterator[tuple[Path, int]]:
+def _integers(path: Path, value: object) -> Iterator[tuple[Path, int]]:
     """All integers, with the paths of their keys; those of an array have that of the array."""
     if isinstance(value, dict):
         for key, inner in value.items():
@@ -207,7 +207,7 @@ def dumps(tables: Mapping[str, Any]) -> str:
     return _NUMBERS.sub(_side_by_side, tomli_w.dumps(tables, indent=INDENT))
 
 
-def _check(value: Any, name: str) -> None:
+def _check(value: object, name: str) -> None:
     if isinstance(value, Mapping):
         for key, part in value.items():
             _check(part, f"{name}.{key}" if name else key)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -138,7 +138,7 @@ class Antenna:
             raise ValueError("antenna values are zero everywhere; some gain must be larger")
         self._set("values", validation.sealed(values / np.abs(values).max()))
 
-    def _set(self, name: str, value: Any) -> None:
+    def _set(self, name: str, value: object) -> None:
         object.__setattr__(self, name, value)
 
     @classmethod
@@ -223,7 +223,7 @@ class Antenna:
             raise ValueError(f"directions has shape {directions.shape}, wanted (..., 3)")
         return pattern_gain(self, directions, validation.number("frequency", frequency, above=0))
 
-    def ratio(self, frequency: float | np.ndarray) -> Any:
+    def ratio(self, frequency: float | np.ndarray) -> float | np.ndarray:
         """Factor by which angles are multiplied before the pattern is evaluated."""
         return 1.0 if self.frequency is None else frequency / self.frequency
 
@@ -281,7 +281,7 @@ class Antenna:
         return out
 
 
-def pair_of(antenna: Any, bistatic: bool) -> tuple[Antenna, Antenna | None]:
+def pair_of(antenna: object, bistatic: bool) -> tuple[Antenna, Antenna | None]:
     """(transmitting, receiving) antennas from one Antenna or a pair; None for the second if the first is two-way."""
     given = antenna if isinstance(antenna, (tuple, list)) else (antenna, antenna)
     if len(given) != 2:
@@ -296,7 +296,7 @@ def pair_of(antenna: Any, bistatic: bool) -> tuple[Antenna, Antenna | None]:
     return tx, None
 
 
-def _pair(name: str, value: Any) -> np.ndarray:
+def _pair(name: str, value: object) -> np.ndarray:
     if validation.ndim(name, value) == 0:
         value = np.full(2, validation.number(name, value))
     out = validation.array(name, value, np.float64, (2,))

@@ -63,7 +63,7 @@ class AntennaArray:
                 raise ValueError(f"array plan[{at}] is {plan[at]}; offsets has rows 0 to {len(self.offsets) - 1}")
             self._set("plan", plan)
 
-    def _set(self, name: str, value: Any) -> None:
+    def _set(self, name: str, value: object) -> None:
         object.__setattr__(self, name, value)
 
     def __repr__(self) -> str:
@@ -255,7 +255,7 @@ class AntennaArray:
         return float(np.ptp(self.centers))
 
 
-def _size(name: str, n: Any) -> int:
+def _size(name: str, n: object) -> int:
     out = validation.count(name, n)
     if out > MOST:
         raise ValueError(f"{name} is {out}; an array has at most {MOST} elements")

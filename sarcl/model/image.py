@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from ..base import arguments, validation
 from ..base.report import Report
@@ -59,7 +59,7 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
 
     data: Any
     grid: ImageGrid
-    gain: Any = 1.0
+    gain: float | NDArray[np.floating] = 1.0
     frequency: float | None = None
     tx: NDArray[np.float64] | None = None
     rx: NDArray[np.float64] | None = None
@@ -127,11 +127,11 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
     __ne__ = object.__ne__
     __hash__ = object.__hash__
 
-    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> np.ndarray:
         made = np.asarray(self.data, dtype)
         return np.array(made) if copy else made
 
-    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **options: Any) -> Any:
+    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: object, **options: object) -> Any:
         return getattr(ufunc, method)(*(np.asarray(i) if isinstance(i, Image) else i for i in inputs), **options)
 
     def __len__(self) -> int:
@@ -304,20 +304,21 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
         )  # fmt: skip
 
 
-def _checked_gain(gain: Any, grid: ImageGrid) -> float | NDArray[np.floating]:
+def _checked_gain(gain: object, grid: ImageGrid) -> float | NDArray[np.floating]:
     """A gain as a number, or as a read-only array of the grid's shape; ValueError for one that cannot be."""
     if validation.ndim("image gain", gain) == 0:
         return validation.number("image gain", gain, above=0)
     kind = np.float32 if getattr(gain, "dtype", None) == np.float32 else np.float64
-    own = isinstance(gain, np.ndarray) and gain.dtype == kind and not gain.flags.writeable and gain.shape == grid.shape
-    made = gain if own else validation.array("image gain", gain, kind, tuple(grid.shape))
-    low = float(made.min())
-    if low < 0 or not np.isfinite(low) or not 0 < float(made.max()) < np.inf:
+    gains = gain if isinstance(gain, np.ndarray) and gain.dtype == kind and gain.shape == grid.shape else None
+    if gains is None or gains.flags.writeable:
+        gains = validation.array("image gain", gain, kind, tuple(grid.shape))
+    low = float(gains.min())
+    if low < 0 or not np.isfinite(low) or not 0 < float(gains.max()) < np.inf:
         raise ValueError(
-            f"image gain is {low:g} to {made.max():g}; it is a sum of weights, 0 where no row saw a pixel, and greater "
-            "than 0 elsewhere"
+            f"image gain is {low:g} to {gains.max():g}; it is a sum of weights, 0 where no row saw a pixel, and "
+            "greater than 0 elsewhere"
         )
-    return made
+    return gains
 
 
 def _looked(grid: ImageGrid, a: int, b: int) -> ImageGrid:

@@ -114,6 +114,7 @@ class ImageGrid:
         with np.errstate(over="ignore", invalid="ignore"):
             far = not (np.abs(made.bounds) < FARTHEST).all()
         if far:
+            assert made.spacing is not None
             raise ValueError(
                 f"pixels of center {_text(center)} and spacing {_text(made.spacing)} reach beyond {FARTHEST:g} m, "
                 "where distances overflow; give both in metres"
@@ -404,7 +405,7 @@ class ImageGrid:
             raise ValueError(f"{what} is for planes; this grid lists its points: use ImageGrid.plane")
 
 
-def _side(name: str, value: Any) -> int:
+def _side(name: str, value: object) -> int:
     """Number of pixels along a side of a plane; indices are int64 in places and float64 in others."""
     out = validation.count(name, value)
     if out > LONGEST:
@@ -433,8 +434,8 @@ def _cells(positions: np.ndarray) -> np.ndarray:
     return validation.sealed(positions)
 
 
-def _text(vector: Any) -> str:
-    return "(" + ", ".join(f"{v:g}" for v in vector) + ")"
+def _text(vector: ArrayLike) -> str:
+    return "(" + ", ".join(f"{v:g}" for v in np.asarray(vector)) + ")"
 
 
 def pair(name: str, value: Any) -> tuple[Any, Any]:

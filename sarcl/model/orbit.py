@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -313,7 +313,7 @@ class Orbit:
         body = ellipse(float(widths[0]), float(widths[1]), n)
         return zero_doppler.ray_ends(np.broadcast_to(p, (n, 3)), body @ axes.T, validation.number("height", height))
 
-    def _time(self, name: str, value: Any) -> float:
+    def _time(self, name: str, value: object) -> float:
         """A time, s since the epoch: a number, or a date."""
         if isinstance(value, (str, datetime.date, np.datetime64)):
             return float(self.seconds(value))

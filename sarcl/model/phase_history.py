@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from ..base import arguments, constants, validation
 from ..base.report import Report
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from .waveform import Waveform
 
 # optional arrays with one entry per row: name -> (dtype, trailing shape)
-PER_ROW = {
+PER_ROW: dict[str, tuple[DTypeLike, tuple[int, ...]]] = {
     "time": (np.float64, ()),
     "tx_channel": (np.int64, ()),
     "rx_channel": (np.int64, ()),
@@ -189,10 +189,12 @@ class PhaseHistory:
                 "(Rows that do start frequency_step apart: give them tx_channel=, such as numpy.arange(n_rows))"
             )
 
-    def _set(self, name: str, value: Any) -> None:
+    def _set(self, name: str, value: object) -> None:
         object.__setattr__(self, name, value)
 
-    def _rows(self, name: str, value: Any, dtype: Any, tail: tuple[int, ...], spread: bool = False) -> np.ndarray:
+    def _rows(
+        self, name: str, value: object, dtype: DTypeLike, tail: tuple[int, ...], spread: bool = False
+    ) -> np.ndarray:
         """`value` with one entry per row; with `spread`, a single number is taken for all rows."""
         n = self.samples.shape[0]
         if validation.ndim(name, value) == 0 and spread:
@@ -439,7 +441,7 @@ def phase_history_fields(raw: PhaseHistory) -> dict[str, Any]:
     }
 
 
-def _words(name: str, value: Any) -> np.ndarray:
+def _words(name: str, value: object) -> np.ndarray:
     """Strings (n,), from strings or from bytes, as files hold them."""
     given = np.asarray(value)
     if given.dtype.kind == "S":

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -58,7 +57,7 @@ class Radar:
         rx_range: ArrayLike,
         tx_gain: ArrayLike = 1.0,
         rx_gain: ArrayLike = 1.0,
-    ) -> Any:
+    ) -> NDArray[np.inexact]:
         """sqrt(W) received from a cross section of 1 m^2: factor x spreading x amplitude gains.
 
         Its square is P G_t G_r lambda^2/((4 pi)^3 R_t^2 R_r^2 L). Ranges m; gains are amplitudes, sqrt(G), and may be

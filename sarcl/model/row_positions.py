@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..base import validation
 from ..base.constants import SPEED_OF_LIGHT
@@ -34,7 +35,9 @@ def at_arrival(track: Trajectory, pulses: np.ndarray, reference_range: np.ndarra
     return {"tx": tx, "rx": rx, "tx_velocity": tx_velocity, "rx_velocity": rx_velocity}
 
 
-def rows_of_track(track: Trajectory, rx: Any, reference_range: np.ndarray, rows: Mapping[str, Any]) -> dict[str, Any]:
+def rows_of_track(
+    track: Trajectory, rx: ArrayLike | None, reference_range: np.ndarray, rows: Mapping[str, Any]
+) -> dict[str, Any]:
     """Fields of a phase history whose rows are the pulses of a track. ValueError for another number of them."""
     validation.instance("track", track, Trajectory)
     twice = [name for name in GIVEN if rows.get(name) is not None] + ["rx"] * (rx is not None)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..base import validation
 
@@ -93,7 +93,7 @@ class Material:
         """True for a perfect conductor."""
         return self.conductivity == np.inf
 
-    def lobe(self, delta: ArrayLike) -> Any:
+    def lobe(self, delta: ArrayLike) -> NDArray[np.float64]:
         """The diagram D at angles delta between normal and bisector, rad (...); 0 for smooth materials."""
         delta = validation.values("delta", delta)
         with np.errstate(invalid="ignore", over="ignore"):  # infinite angles have no direction: NaN, as of NaN
@@ -107,7 +107,7 @@ class Material:
         """Integral of D cos over the hemisphere, sr: pi for an isotropic diagram; 1 where there is none."""
         return 1.0 if self.diagram in COHERENT else _solid_angle(self)
 
-    def permittivity(self, frequency: ArrayLike) -> Any:
+    def permittivity(self, frequency: ArrayLike) -> NDArray[np.complex128]:
         """Complex relative permittivity eps_r - j conductivity/(2 pi f eps0) at `frequency`, Hz, of its shape.
 
         eps_r may be complex itself: both losses add. The imaginary part is negative, because fields vary as
@@ -138,14 +138,14 @@ def _solid_angle(material: Material) -> float:
     return float(np.pi * end / 2 * (weights * material.lobe(delta) * np.sin(2 * delta)).sum())
 
 
-def _number(name: str, value: Any, inf: bool) -> float:
+def _number(name: str, value: object, inf: bool) -> float:
     """A float, which may be infinite where `inf` is True; an error names the argument."""
     if inf and isinstance(value, (float, np.floating)) and value == np.inf:
         return np.inf
     return validation.number(name, value)
 
 
-def _lossy(value: Any) -> complex:
+def _lossy(value: complex) -> complex:
     """A complex eps_r; a float where its imaginary part is 0."""
     if np.ndim(value) or np.ma.is_masked(value):
         raise ValueError(f"eps_r must be a number, got {value!r:.80}")
@@ -227,7 +227,7 @@ def resolve(
         words, index = np.unique(given, return_inverse=True)
         index, kinds = index.reshape(given.shape), [_one(str(word), names) for word in words]
     else:
-        places: dict[Any, int] = {}
+        places: dict[object, int] = {}
         index = np.array([places.setdefault(_key(m), len(places)) for m in given.flat], np.int32)
         index, kinds = index.reshape(given.shape), [_one(m, names) for m in places]
     table, place = merge([[m for m, _ in kinds]])
@@ -265,7 +265,7 @@ def checked_table(materials: Sequence[Material], index: np.ndarray) -> tuple[tup
     return tuple(replace(m, reflectivity=1.0) for m in table), factor
 
 
-def _array(material: Any) -> np.ndarray:
+def _array(material: object) -> np.ndarray:
     """`material` as an array of numbers, of words, or of objects."""
     if isinstance(material, (Material, Mapping)) or material is None:
         out = np.empty((), object)
@@ -278,7 +278,7 @@ def _array(material: Any) -> np.ndarray:
     return np.asarray(material, object) if mixed or out.dtype.kind not in "iufU" else out
 
 
-def _key(material: Any) -> Any:
+def _key(material: object) -> object:
     try:
         hash(material)
     except TypeError:
@@ -286,13 +286,13 @@ def _key(material: Any) -> Any:
     return material
 
 
-def _listed(materials: Any) -> list[tuple[Material, float]]:
+def _listed(materials: object) -> list[tuple[Material, float]]:
     if isinstance(materials, (str, Mapping)) or not isinstance(materials, Sequence) or not len(materials):
         raise ValueError(f"materials is {materials!r:.60}; give a list of materials, such as ['metal', 'concrete']")
     return [_one(m, {}) for m in materials]
 
 
-def _one(material: Any, names: Mapping[str, tuple[Material, float]]) -> tuple[Material, float]:
+def _one(material: object, names: Mapping[str, tuple[Material, float]]) -> tuple[Material, float]:
     """A material of reflectivity 1, and its reflectivity."""
     if isinstance(material, Material):
         return replace(material, reflectivity=1.0), material.reflectivity
@@ -307,7 +307,7 @@ def _one(material: Any, names: Mapping[str, tuple[Material, float]]) -> tuple[Ma
     return METAL, float(_reflectivity(np.asarray(validation.number("material", material))))
 
 
-def _unknown(material: Any, names: Mapping[str, Any]) -> ValueError:
+def _unknown(material: object, names: Mapping[str, object]) -> ValueError:
     known = ", ".join(map(repr, [*names, *(n for n in MATERIALS if n not in names)]))
     return ValueError(
         f"material is {material!r:.60}; known are {known}; or give a sarcl.Material, or a reflectivity from 0 to 1"

@@ -16,7 +16,7 @@ parallelepiped, cylinder), Wan et al. Figs 6-8 (frustum, cuboid, cylinder), Zou 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 import numpy as np
@@ -169,7 +169,9 @@ def _cuts(facets: int) -> int:
     return int(np.ceil(np.sqrt(facets / 20)))
 
 
-def _revolved(profile: Any, edge: float | None, sections: int | None, **options: Any) -> Scene:
+def _revolved(
+    profile: Sequence[tuple[float, float]], edge: float | None, sections: int | None, **options: Unpack[ClosedOptions]
+) -> Scene:
     """The surface of revolution about the z axis of a line of (radius, z), from bottom to top."""
     return _placed(_solids.revolved(profile, edge, sections), edge, **options)
 
@@ -191,7 +193,7 @@ def _placed(
     return scene.split(min(validation.number("edge", edge, above=0), geometry.FARTHEST))
 
 
-def _length(name: str, value: Any) -> float:
+def _length(name: str, value: object) -> float:
     out = validation.number(name, value, above=0)
     geometry.check_reach(name, np.array(out))
     return out
@@ -206,7 +208,7 @@ def _dimensions(name: str, size: ArrayLike, n: int) -> list[float]:
 SHAPES = (plate, disc, box, cylinder, cone, frustum, sphere, tank)
 
 
-def _spell_out(shape: Any) -> None:
+def _spell_out(shape: Callable[..., Scene]) -> None:
     """Show the keywords of `options` to help() and scenario files, as the signature of the shape."""
     own = inspect.signature(shape)
     more = [p for call in (_placed, Scene.facets) for p in inspect.signature(call).parameters.values()]

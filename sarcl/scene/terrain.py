@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, DTypeLike
 
 from ..base import validation
 from . import triangles as geometry
-from .material import resolve
+from .material import FacetMaterials, MaterialLike, resolve
 
 log = logging.getLogger(__name__)
 
@@ -17,7 +19,7 @@ Heights = tuple[np.ndarray, np.ndarray, np.ndarray]  # x (n_x,), y (n_y,), both 
 ON = 1e-9  # of a terrain's size: corners no farther from it lie on it
 
 
-def grid(x: Any, y: Any, z: Any) -> np.ndarray:
+def grid(x: ArrayLike, y: ArrayLike, z: ArrayLike | Callable[[np.ndarray, np.ndarray], ArrayLike]) -> np.ndarray:
     """Points, m (n_y, n_x, 3), of heights z (n_y, n_x), or a function z(x, y), over increasing x (n_x,), y (n_y,)."""
     x = validation.array("x", x, np.float64, ("n_x",))
     y = validation.array("y", y, np.float64, ("n_y",))
@@ -42,7 +44,12 @@ def heights(points: np.ndarray) -> Heights:
 
 
 def surface(
-    points: np.ndarray, up: np.ndarray, material: Any, materials: Any, roughness: Any, point_roughness: Any
+    points: np.ndarray,
+    up: np.ndarray,
+    material: FacetMaterials,
+    materials: Sequence[MaterialLike] | None,
+    roughness: ArrayLike,
+    point_roughness: ArrayLike,
 ) -> dict[str, Any]:
     """Arguments of Scene.facets for a grid of points, m (n, m, 3): two facets per cell, none where a point is NaN.
 
@@ -81,7 +88,7 @@ def surface(
     }
 
 
-def spread(name: str, value: Any, shape: tuple[int, ...], dtype: Any = np.float64) -> np.ndarray:
+def spread(name: str, value: object, shape: tuple[int, ...], dtype: DTypeLike = np.float64) -> np.ndarray:
     """`value` for every facet, cell or point: one number for all, or an array of `shape`; read-only."""
     if dtype == np.bool_:
         value = validation.flags(name, value)

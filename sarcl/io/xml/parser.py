@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree
 
 from .. import input_paths
@@ -23,7 +22,7 @@ class _Builder(ElementTree.TreeBuilder):
     count = depth = 0
     instructions = True
 
-    def start(self, tag: Any, attrs: Any) -> Any:
+    def start(self, tag: str, attrs: dict[str, str]) -> ElementTree.Element:
         self.count += 1
         self.depth += 1
         if self.count > MOST_ELEMENTS:
@@ -32,7 +31,7 @@ class _Builder(ElementTree.TreeBuilder):
             raise Refused(f"has elements within one another, more than {DEEPEST} deep")
         return super().start(tag, attrs)
 
-    def end(self, tag: Any) -> Any:
+    def end(self, tag: str) -> ElementTree.Element:
         self.depth -= 1
         return super().end(tag)
 
@@ -40,7 +39,7 @@ class _Builder(ElementTree.TreeBuilder):
         """Entities of a document type may expand to far more text than the file has, or read other files."""
         raise Refused("has a document type (<!DOCTYPE>), which may define entities")
 
-    def pi(self, target: str, data: str | None = None) -> Any:
+    def pi(self, target: str, data: str | None = None) -> None:  # type: ignore[override]  # instructions are no elements
         """A processing instruction, <?target data?>."""
         if not self.instructions:
             raise Refused(f"has a processing instruction (<?{target:.40}), which programs take differently")
