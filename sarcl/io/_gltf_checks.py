@@ -9,10 +9,10 @@ from typing import Any
 MAGIC, JSON_CHUNK = b"glTF", 20  # first bytes of a .glb file; where the text of its first chunk begins
 # extensions that change where surfaces are, and those that say how they look, which is not needed
 PLACES = {"EXT_mesh_gpu_instancing", "KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"}
-LOOKS = (
-    "KHR_materials_", "KHR_texture_", "KHR_lights_", "KHR_xmp", "KHR_animation_pointer", "EXT_texture_", "EXT_lights_",
-    "MSFT_texture_", "ADOBE_materials_", "AGI_", "CESIUM_outline", "KHR_mesh_quantization",
-)  # fmt: skip
+LOOKS = tuple(
+    "KHR_materials_ KHR_texture_ KHR_lights_ KHR_xmp KHR_animation_pointer EXT_texture_ EXT_lights_ MSFT_texture_ "
+    "ADOBE_materials_ AGI_ CESIUM_outline KHR_mesh_quantization".split()
+)
 FAN = 6  # mode of a primitive; trimesh reads 4 (triangles) and 5 (strips), and 0 to 3 are points and lines
 INTEGERS = (5120, 5121, 5122, 5123)  # component types of quantized positions
 TAKE = "which is not read here, and its surfaces would be missing or elsewhere"

@@ -14,18 +14,15 @@ import numpy as np
 
 from . import _mesh_checks
 
-TYPES = {
-    "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4",
-    "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4",
-    "int64": "i8", "uint64": "u8", "float16": "f2", "float32": "f4", "float64": "f8",
-}  # fmt: skip
+C_TYPES = "char:i1 uchar:u1 short:i2 ushort:u2 int:i4 uint:u4 float:f4 double:f8"
+SIZED_TYPES = (
+    "int8:i1 uint8:u1 int16:i2 uint16:u2 int32:i4 uint32:u4 int64:i8 uint64:u8 float16:f2 float32:f4 float64:f8"
+)
+TYPES = dict(pair.split(":") for pair in f"{C_TYPES} {SIZED_TYPES}".split())  # NumPy's types by those of a header
 HEADER = re.compile(rb"ply[ \t]*\r?\n((?:.*?\n)??)[ \t]*end_header[ \t]*(?:\r?\n|$)", re.DOTALL)
 Order = Literal["", "<", ">"]
-ORDER: dict[str, Order] = {
-    "ascii": "",
-    "binary_little_endian": "<",
-    "binary_big_endian": ">",
-}  # of bytes; text has none
+# order of bytes by the name of a format; text has none
+ORDER: dict[str, Order] = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 FACES = ("vertex_index", "vertex_indices")
 PIECE = 2**18  # numbers read at a time, so that what is made on the way to them stays small
 LONGEST = 400  # characters of a number as text: the largest of float64 has 309 digits before its point

@@ -134,8 +134,6 @@ def _scene(
         _gltf_checks.check(data, what)
     elif kind == ".dae":
         _collada_checks.check_kind(data, what)
-    elif kind in _mesh_archive.ZIPPED:
-        _mesh_archive.check_size(data, what)
     try:
         collada = _collada_checks.opened(data) if kind == ".dae" else None
         # process=False: merging and reordering corners is not needed and hides what the file holds
