@@ -45,8 +45,10 @@ class CheckedRows(h5py.Dataset):
             if plain and (stop - start) * row <= 2 * AT_ONCE:  # one reading serves the check and the caller
                 rows = self._read(slice(start, stop))
                 self._compare(rows, a)
-                wanted = rows[low - start : high - start]
-                return wanted.copy() if 2 * len(wanted) < len(rows) else wanted  # does not hold much more than asked
+                selection = rows[low - start : high - start]
+                return (
+                    selection.copy() if 2 * len(selection) < len(rows) else selection
+                )  # does not hold much more than asked
             for block in range(a, b):
                 if not self._good[block]:
                     self._compare(self._read(slice(block * step, min((block + 1) * step, self.shape[0]))), block)

@@ -39,16 +39,18 @@ def check(document: collada.Collada, what: str) -> None:
         )
     if next(root.iter(tag("ph")), None) is not None:
         raise ValueError(f"{what} has polygons with holes, which are not read here; export it as triangles")
-    wanted = sum(1 for one in root.iter(tag("geometry")) if one.find(tag("mesh")) is not None)
-    lost = wanted - len(document.geometries)
-    if lost > 0:
-        raise ValueError(f"{what}: {lost} of {wanted} geometries cannot be read ({_why(document)}); {AGAIN}")
+    n_declared = sum(1 for one in root.iter(tag("geometry")) if one.find(tag("mesh")) is not None)
+    n_missing = n_declared - len(document.geometries)
+    if n_missing > 0:
+        raise ValueError(f"{what}: {n_missing} of {n_declared} geometries cannot be read ({_why(document)}); {AGAIN}")
     libraries = [*root.iter(tag("library_visual_scenes")), *root.iter(tag("library_nodes"))]
-    wanted = sum(1 for one in libraries for kind in ("geometry", "node") for _ in one.iter(tag(f"instance_{kind}")))
+    n_declared = sum(1 for one in libraries for kind in ("geometry", "node") for _ in one.iter(tag(f"instance_{kind}")))
     placed = [node for one in (*document.scenes, document) for top in one.nodes for node in _instances(top)]
-    lost = wanted - len(placed)
-    if lost > 0:
-        raise ValueError(f"{what}: {lost} of {wanted} placed geometries cannot be read ({_why(document)}); {AGAIN}")
+    n_missing = n_declared - len(placed)
+    if n_missing > 0:
+        raise ValueError(
+            f"{what}: {n_missing} of {n_declared} placed geometries cannot be read ({_why(document)}); {AGAIN}"
+        )
     for geometry in {id(node.geometry): node.geometry for node in placed if hasattr(node, "geometry")}.values():
         for primitive in geometry.primitives:
             _check_primitive(primitive, f"{what}, geometry {geometry.id!r:.60}")
@@ -77,8 +79,8 @@ def _check_primitive(primitive: collada.primitive.Primitive, where: str) -> None
         return
     corners = np.asarray(primitive.vcounts, np.int64)
     if (corners < 3).any():
-        at = int(np.argmax(corners < 3))
-        raise ValueError(f"{where}: face {at} has {corners[at]} corners, wanted at least 3; {AGAIN}")
+        face = int(np.argmax(corners < 3))
+        raise ValueError(f"{where}: face {face} has {corners[face]} corners, wanted at least 3; {AGAIN}")
     if corners.sum() != len(index):
         raise ValueError(f"{where}: its faces have {corners.sum()} corners, and it holds {len(index)}; {AGAIN}")
     wrong = _mesh_checks.wrong_fans(corners, index, np.asarray(primitive.vertex))

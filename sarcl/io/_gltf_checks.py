@@ -51,8 +51,8 @@ def check(data: bytes, what: str) -> None:
                 raise ValueError(f"{what} has fans of triangles (mode 6), {TAKE}; export it as triangles")
             for name in PLACES & set(_object(primitive.get("extensions"))):
                 raise ValueError(f"{what} has meshes with the extension {name!r}, {TAKE}; {AGAIN} it")
-            for at in (primitive.get("indices"), _object(primitive.get("attributes")).get("POSITION")):
-                accessor = accessors[at] if isinstance(at, int) and 0 <= at < len(accessors) else {}
+            for number in (primitive.get("indices"), _object(primitive.get("attributes")).get("POSITION")):
+                accessor = accessors[number] if isinstance(number, int) and 0 <= number < len(accessors) else {}
                 if "sparse" in accessor:
                     raise ValueError(f"{what} has sparse accessors, {TAKE}; {AGAIN} them")
                 if accessor.get("normalized") and accessor.get("componentType") in INTEGERS:

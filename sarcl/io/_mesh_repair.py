@@ -156,11 +156,11 @@ def _turns_about(triangles: np.ndarray, places: np.ndarray) -> float:
     The sum of their solid angles over 4 pi: of a triangle a, b, c as seen from 0, twice the angle whose tangent is
     a.(b x c) / (|a||b||c| + a.b |c| + b.c |a| + c.a |b|).
     """
-    found = 0.0
+    angle = 0.0
     for place in places:
         a, b, c = np.moveaxis(triangles - place, 1, 0)
         la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
         over = np.einsum("ij,ij->i", a, np.cross(b, c))
         under = la * lb * lc + (a * b).sum(1) * lc + (b * c).sum(1) * la + (c * a).sum(1) * lb
-        found += abs(float(np.arctan2(over, under).sum()))
-    return found / (2 * np.pi * len(places))
+        angle += abs(float(np.arctan2(over, under).sum()))
+    return angle / (2 * np.pi * len(places))

@@ -52,15 +52,15 @@ class Part:
         alone  FileExistsError, which names `shown`, while another process has a file for the same target
         """
         for _ in range(TRIES):
-            made = cls(target)
+            part = cls(target)
             try:
-                others = _clean(target, made.path)
+                others = _clean(target, part.path)
             except BaseException:
-                made.remove()
+                part.remove()
                 raise
             if not (alone and others):
-                return made
-            made.remove()
+                return part
+            part.remove()
             time.sleep(0.05 * float(secrets.randbelow(1000)) / 1000)
         raise FileExistsError(
             f"cannot write {str(shown)!r}: another run is writing it; wait for that one or choose another name"
@@ -83,16 +83,16 @@ class Part:
             return
         self.target.parent.mkdir(parents=True, exist_ok=True)
         log.warning("%s was deleted while %s was written in it; it is made again", self.target.parent, self.target.name)
-        made = Part(self.target)
+        part = Part(self.target)
         try:
-            with open(os.dup(self._lock), "rb") as held, open(made.path, "wb") as file:
-                held.seek(0)
-                shutil.copyfileobj(held, file)
+            with open(os.dup(self._lock), "rb") as source, open(part.path, "wb") as file:
+                source.seek(0)
+                shutil.copyfileobj(source, file)
         except BaseException:
-            made.remove()
+            part.remove()
             raise
         os.close(self._lock)
-        self.path, self._lock = made.path, made._lock
+        self.path, self._lock = part.path, part._lock
 
     def remove(self) -> None:
         """Remove this file."""
@@ -149,21 +149,21 @@ def _clean(target: Path, own: Path) -> bool:
         if match is None or path == own:
             continue
         try:
-            found = os.open(path, os.O_RDWR | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0))
+            descriptor = os.open(path, os.O_RDWR | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0))
         except OSError:  # a link, or of another user, or gone
             continue
         try:
-            status = os.fstat(found)
+            status = os.fstat(descriptor)
             mine = stat.S_ISREG(status.st_mode) and (not hasattr(os, "getuid") or status.st_uid == os.getuid())
-            free = _locked(found)
+            free = _locked(descriptor)
             if free is False:
                 others |= match["target"] == _tag(target)
             elif free and mine and (match["host"] == _host() or time.time() - status.st_mtime > OLD):
-                if _is(found, path):
+                if _is(descriptor, path):
                     path.unlink()
                     log.info("removed %s, which a killed run left", path)
         except OSError as exc:
             log.debug("%s stays: %s", path, exc)
         finally:
-            os.close(found)
+            os.close(descriptor)
     return others

@@ -59,8 +59,8 @@ class Unfinished:
         try:
             yield
         except (OSError, RuntimeError) as exc:  # h5py raises either for the same full disk
-            found = re.search(r"errno = (\d+)", str(exc))
-            number = int(found[1]) if found else getattr(exc, "errno", None)
+            match = re.search(r"errno = (\d+)", str(exc))
+            number = int(match[1]) if match else getattr(exc, "errno", None)
             why = os.strerror(number) if number else " ".join(str(exc).split())[:100]
             more = " and give the same call again"
             if self.resumes:
@@ -93,11 +93,11 @@ class Unfinished:
         assert self._part is not None
         with self.writing():
             self.file.flush()
-            found = _checksums.layout(self.file, self.file.id.get_filesize(), *(self._rows or ("", None)))
+            sums = _checksums.layout(self.file, self.file.id.get_filesize(), *(self._rows or ("", None)))
             self.file.close()
             self._part.restore()
-            os.truncate(self._part.path, found.size)  # releases the bytes that were reserved and not used
-            _checksums.append(self._part.path, found)
+            os.truncate(self._part.path, sums.size)  # releases the bytes that were reserved and not used
+            _checksums.append(self._part.path, sums)
         self._part.commit()
         self._part = None
 

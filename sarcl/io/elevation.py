@@ -61,11 +61,12 @@ def load(
         longitude, latitude = _places(file, name, rows, columns)
     if above:
         height = height + undulation(geoid, longitude, latitude, name, above, external)
+    reference = f"{above} changed to the ellipsoid's" if above else "the ellipsoid"
     log.info(
-        "%s: %d x %d points, longitude %.5f to %.5f, latitude %.5f to %.5f, %d without data, heights above %s",
-        name, *height.shape, longitude.min(), longitude.max(), latitude.min(), latitude.max(),
-        np.isnan(height).sum(), f"{above} changed to the ellipsoid's" if above else "the ellipsoid",
-    )  # fmt: skip
+        f"{name}: {height.shape[0]} x {height.shape[1]} points, longitude {longitude.min():.5f} to "
+        f"{longitude.max():.5f}, latitude {latitude.min():.5f} to {latitude.max():.5f}, {np.isnan(height).sum()} "
+        f"without data, heights above {reference}"
+    )
     return Tile(longitude, latitude, height)
 
 
@@ -149,25 +150,25 @@ def _reference(file: DatasetReader, name: str, heights: str | None, geoid: Geoid
     """The geoid that heights are above, by its name; "" for the ellipsoid."""
     wkt = file.crs.to_wkt(version="WKT2_2019")
     vertical = re.search(r'VERTCRS\["([^"]+)"', wkt)
-    said = vertical[1] if vertical else "ellipsoid" if "CS[ellipsoidal,3]" in wkt else ""
+    stated = vertical[1] if vertical else "ellipsoid" if "CS[ellipsoidal,3]" in wkt else ""
     if heights is not None and not (isinstance(heights, str) and heights):
         raise ValueError(f"heights is {heights!r}; give 'ellipsoid' or the name of a geoid, such as 'EGM96'")
-    if heights is None and not said:
+    if heights is None and not stated:
         raise ValueError(
             f"{name} does not say what its heights are above; pass heights='ellipsoid', or the geoid's name "
             "(heights='EGM96' for SRTM, 'EGM2008' for Copernicus) with geoid=..."
         )
-    words = [re.sub(r"[\W_]|height|geoid", "", s.lower()) for s in (said, heights or said)]
+    words = [re.sub(r"[\W_]|height|geoid", "", s.lower()) for s in (stated, heights or stated)]
     ellipsoid = ["ellipsoid" in w for w in words]
-    if said and ellipsoid[0] != ellipsoid[1]:
-        raise ValueError(f"heights is {heights!r}, but {name} says that its heights are above {said!r}")
+    if stated and ellipsoid[0] != ellipsoid[1]:
+        raise ValueError(f"heights is {heights!r}, but {name} says that its heights are above {stated!r}")
     if ellipsoid[1]:
         if geoid is not None:
             raise ValueError(f"{name} has heights above the ellipsoid; geoid=... would count the undulation twice")
         return ""
     if words[0] and words[0] != words[1]:
-        log.info("%s says %r; its heights are taken above %r as asked", name, said, heights)
-    above = heights or said
+        log.info("%s says %r; its heights are taken above %r as asked", name, stated, heights)
+    above = heights or stated
     if geoid is None:
         raise ValueError(
             f"{name} has heights above {above!r}, not above the ellipsoid; give the undulation as geoid=...: a number "
@@ -193,14 +194,16 @@ def _window(file: DatasetReader, name: str, bounds: ArrayLike | None) -> tuple[n
         left, bottom, right, top = transform_bounds(WGS84, file.crs, *bounds) if _warped(file) else bounds
         t = ~file.transform
         corners = [(t.d * x + t.e * y + t.f, t.a * x + t.b * y + t.c) for x in (left, right) for y in (bottom, top)]
-        at = np.array(corners) - 0.5  # points are centres of pixels
-        low = np.maximum(np.ceil(at.min(axis=0) - 1e-6), 0)
-        high = np.minimum(np.floor(at.max(axis=0) + 1e-6), (file.height - 1, file.width - 1))
+        indices = np.array(corners) - 0.5  # points are centres of pixels
+        low = np.maximum(np.ceil(indices.min(axis=0) - 1e-6), 0)
+        high = np.minimum(np.floor(indices.max(axis=0) + 1e-6), (file.height - 1, file.width - 1))
     if (high - low < 1).any():
         from rasterio.warp import transform_bounds
 
-        there = ", ".join(f"{v:.5f}" for v in transform_bounds(file.crs, WGS84, *file.bounds))
-        raise ValueError(f"bounds hold no cell of {name}, which reaches over ({there}); check west, south, east, north")
+        extent = ", ".join(f"{v:.5f}" for v in transform_bounds(file.crs, WGS84, *file.bounds))
+        raise ValueError(
+            f"bounds hold no cell of {name}, which reaches over ({extent}); check west, south, east, north"
+        )
     shape = [int(b) - int(a) + 1 for a, b in zip(low, high, strict=True)]
     if shape[0] * shape[1] > MOST_POINTS:  # before there are lists of them
         raise MemoryError(
@@ -270,7 +273,7 @@ def _warped(file: DatasetReader) -> bool:
 
 def undulation(
     geoid: Geoid, longitude: np.ndarray, latitude: np.ndarray, name: str, above: str, external: bool = False
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """Height above the ellipsoid, m, of the geoid called `above`, at points, degrees (n_rows, n_columns)."""
     if isinstance(geoid, (str, Path)):
         return _raster(Path(geoid), longitude, latitude, external)

@@ -64,9 +64,13 @@ class Format:
 
 
 HDF5 = Format(
-    (".h5", ".hdf5"), b"\x89HDF\r\n\x1a\n", "sarcl's own HDF5 files (raw.save, image.save)", "sarcl_hdf5",
-    writes=("phase history", "image"), by_blocks=True,
-)  # fmt: skip
+    (".h5", ".hdf5"),
+    b"\x89HDF\r\n\x1a\n",
+    "sarcl's own HDF5 files (raw.save, image.save)",
+    "sarcl_hdf5",
+    writes=("phase history", "image"),
+    by_blocks=True,
+)
 FORMATS = (
     Format((".png",), writes=("picture",)),
     HDF5,
@@ -86,14 +90,14 @@ def load(path: Path, make: Make[T], autofocus: bool = False, external: bool = Fa
     IsADirectoryError, PermissionError.
     """
     head = input_paths.head(path, folder="give the files in it, e.g. sorted(Path(folder).glob('*.mat'))")
-    found = next((f for f in FORMATS if f.starts and head.startswith(f.starts)), None)
-    if found is not None:
-        return found.functions.load(path, make, autofocus, **({"external": True} if external and found is HDF5 else {}))
-    known = (text for starts, text in NOT_READ.items() if head.startswith(starts))
-    other = f"starts with {head[:12]!r}, which is no file kind sarcl knows" if head else "is empty"
-    promised = any(path.suffix.lower() in f.endings for f in FORMATS if f.starts)
-    although = f" although its name ends in {path.suffix!r}" if promised else ""
-    raise ValueError(f"{str(path)!r} {next(known, other)}{although}; sarcl reads {readable('and')}")
+    form = next((f for f in FORMATS if f.starts and head.startswith(f.starts)), None)
+    if form is not None:
+        return form.functions.load(path, make, autofocus, **({"external": True} if external and form is HDF5 else {}))
+    unreadable = (text for starts, text in NOT_READ.items() if head.startswith(starts))
+    unknown = f"starts with {head[:12]!r}, which is no file kind sarcl knows" if head else "is empty"
+    is_named_so = any(path.suffix.lower() in f.endings for f in FORMATS if f.starts)
+    although = f" although its name ends in {path.suffix!r}" if is_named_so else ""
+    raise ValueError(f"{str(path)!r} {next(unreadable, unknown)}{although}; sarcl reads {readable('and')}")
 
 
 def writing(*kinds: Written, by_blocks: bool = False) -> list[Format]:
@@ -132,8 +136,8 @@ def writer_functions(path: PathLike, kind: Written) -> ModuleType:
     among, path = writing(kind), arguments.path("path", path)
     form = named(path, among)
     if form is None:
-        wanted = suggested(among, "'")
-        raise ValueError(f"{kind} path {str(path)!r} {ending_of(path)}; sarcl writes a {kind} to {wanted}")
+        endings = suggested(among, "'")
+        raise ValueError(f"{kind} path {str(path)!r} {ending_of(path)}; sarcl writes a {kind} to {endings}")
     return form.functions
 
 

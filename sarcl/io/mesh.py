@@ -58,8 +58,8 @@ def load(mesh: object, repair: bool = True, external: bool = False) -> Mesh:
         what = f"mesh file {Path(mesh).name!r}"
         mesh = _read(Path(mesh), what, external)
     if isinstance(mesh, trimesh.Trimesh):
-        alone, mesh = mesh, trimesh.Scene()
-        mesh.add_geometry(alone, geom_name=alone.metadata.get("name"))
+        single, mesh = mesh, trimesh.Scene()
+        mesh.add_geometry(single, geom_name=single.metadata.get("name"))
     if not isinstance(mesh, trimesh.Scene):
         raise TypeError(f"{what} is a {type(mesh).__name__}; give a file name or a trimesh.Trimesh")
     vertices, faces, part, names = _parts(mesh, what)
@@ -77,13 +77,13 @@ def _unit(scene: trimesh.Scene, what: str) -> float | None:
     """Metres per unit of a trimesh.Scene, None where it names no unit; ValueError where its parts have several."""
     from trimesh.units import unit_conversion
 
-    named = {geometry.units for geometry in scene.geometry.values() if getattr(geometry, "units", None)}
-    if not named:
+    units = {geometry.units for geometry in scene.geometry.values() if getattr(geometry, "units", None)}
+    if not units:
         return None
-    found = {float(f"{unit_conversion(unit, 'meters'):.12g}") for unit in named}
-    if len(found) > 1:
-        raise ValueError(f"{what} has parts in several units ({', '.join(sorted(named))}); export it in one unit")
-    return found.pop()
+    lengths = {float(f"{unit_conversion(unit, 'meters'):.12g}") for unit in units}
+    if len(lengths) > 1:
+        raise ValueError(f"{what} has parts in several units ({', '.join(sorted(units))}); export it in one unit")
+    return lengths.pop()
 
 
 def _read(path: Path, what: str, external: bool) -> trimesh.Scene:
@@ -91,23 +91,23 @@ def _read(path: Path, what: str, external: bool) -> trimesh.Scene:
     import trimesh
 
     input_paths.check(path, "mesh file")
-    known = sorted(trimesh.available_formats())
+    formats = sorted(trimesh.available_formats())
     kind = path.suffix.lower()
-    if kind.lstrip(".") not in known:
-        raise ValueError(f"{what}: unknown format {path.suffix!r}; known are {', '.join(known)}")
+    if kind.lstrip(".") not in formats:
+        raise ValueError(f"{what}: unknown format {path.suffix!r}; known are {', '.join(formats)}")
     if kind not in _mesh_archive.KINDS:
-        around = _other_files.Resolver(path, external)
-        made = _scene(input_paths.contents(path, "mesh file"), kind, path, what, around)
-        _check_refused(around, what)
-        return made
+        resolver = _other_files.Resolver(path, external)
+        scene = _scene(input_paths.contents(path, "mesh file"), kind, path, what, resolver)
+        _check_refused(resolver, what)
+        return scene
     files = _mesh_archive.contents(path, what)
     names = _mesh_archive.meshes(path, files, trimesh.exchange.load.mesh_formats(), what)
     scenes = []
     for name in names:
-        held = {other: io.BytesIO(data) for other, data in _mesh_archive.beside(files, name).items()}
-        others = trimesh.resolvers.ZipResolver(held)
-        kind, of_it = Path(name).suffix.lower(), f"{what}, its file {name!r:.100}"
-        scenes.append(_scene(files[name], kind, None, of_it, others))
+        neighbours = {other: io.BytesIO(data) for other, data in _mesh_archive.beside(files, name).items()}
+        archive = trimesh.resolvers.ZipResolver(neighbours)
+        kind, label = Path(name).suffix.lower(), f"{what}, its file {name!r:.100}"
+        scenes.append(_scene(files[name], kind, None, label, archive))
     return trimesh.scene.scene.append_scenes(scenes) if len(scenes) > 1 else scenes[0]
 
 
@@ -122,9 +122,9 @@ def _scene(
 
     if kind == ".ply":
         vertices, faces = _ply.read(data, what)
-        made = trimesh.Scene()
-        made.add_geometry(trimesh.Trimesh(vertices, faces, process=False), geom_name=path.name if path else None)
-        return made
+        scene = trimesh.Scene()
+        scene.add_geometry(trimesh.Trimesh(vertices, faces, process=False), geom_name=path.name if path else None)
+        return scene
     declared = _mesh_checks.declared_faces(data, kind, what)
     if kind == ".off":
         _mesh_text.check_off(data, what)
@@ -137,7 +137,7 @@ def _scene(
     try:
         collada = _collada_checks.opened(data) if kind == ".dae" else None
         # process=False: merging and reordering corners is not needed and hides what the file holds
-        made = trimesh.load_scene(
+        scene = trimesh.load_scene(
             io.BytesIO(data),
             file_type=str(path.absolute()) if path else kind[1:],
             process=False,
@@ -155,9 +155,9 @@ def _scene(
         ) from exc
     if collada is not None:
         _collada_checks.check(collada, what)
-    held = sum(len(one.faces) for one in made.geometry.values() if isinstance(one, trimesh.Trimesh))
-    _mesh_checks.check_held(declared, held, what)
-    return made
+    n_faces = sum(len(one.faces) for one in scene.geometry.values() if isinstance(one, trimesh.Trimesh))
+    _mesh_checks.check_held(declared, n_faces, what)
+    return scene
 
 
 def _check_refused(others: _other_files.Resolver, what: str) -> None:
@@ -202,17 +202,17 @@ def part_materials(material: object, mesh: Mesh) -> dict[str, Any]:
     """
     if not isinstance(material, Mapping):
         return {"material": material}
-    known = {name for names in mesh.names for name in names}
-    there = "; ".join(" = ".join(map(repr, names)) for names in mesh.names)
+    part_names = {name for names in mesh.names for name in names}
+    parts_text = "; ".join(" = ".join(map(repr, names)) for names in mesh.names)
     for name in material:
-        if name not in known and name != "*":
-            raise ValueError(f"material names a part {name!r} that the mesh does not have; its parts are {there}")
+        if name not in part_names and name != "*":
+            raise ValueError(f"material names a part {name!r} that the mesh does not have; its parts are {parts_text}")
     choice = [next((name for name in (*names, "*") if name in material), None) for names in mesh.names]
-    for names, chosen in zip(mesh.names, choice, strict=True):
-        if chosen is None:
+    for names, name_used in zip(mesh.names, choice, strict=True):
+        if name_used is None:
             raise ValueError(
                 f"material does not say what the part {names[0]!r} is made of; name it or give '*' for the rest: the "
-                f"parts are {there}"
+                f"parts are {parts_text}"
             )
     words = list(dict.fromkeys(choice))
     place = np.array([words.index(c) for c in choice])

@@ -83,9 +83,9 @@ def no_room(path: PathLike, cause: OSError | None, n_bytes: float = 0, what: str
     if cause is not None and cause.errno == errno.EFBIG:
         remedy = "raise the limit on files' sizes (ulimit -f)"
     number = errno.ENOSPC if cause is None else cause.errno
-    made = OSError(f"cannot write {str(path)!r}: {why}{what} {needs}; {remedy}{more}")
-    made.errno = number
-    return made
+    error = OSError(f"cannot write {str(path)!r}: {why}{what} {needs}; {remedy}{more}")
+    error.errno = number
+    return error
 
 
 def check_room(needs: Mapping[PathLike, float]) -> None:

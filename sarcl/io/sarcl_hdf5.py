@@ -10,7 +10,8 @@ come in and out; sarcl/model/store.py makes objects of them.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -56,10 +57,10 @@ def load(path: PathLike, make: Make[T], autofocus: bool = False, external: bool 
         kind, rows = ROWS[mark]
         try:
             _hdf5_safety.check_contents(file, Path(path).stat().st_size, external)
-            held = file[rows]
+            dataset = file[rows]
             if sums is not None and sums.rows is not None:
-                held = _with_checksums(held, sums)
-            fields = {**hdf5.get_all(file, leave=("report", rows)), rows: held, "report": hdf5.get_report(file)}
+                dataset = _with_checksums(dataset, sums)
+            fields = {**hdf5.get_all(file, leave=("report", rows)), rows: dataset, "report": hdf5.get_report(file)}
             return make(kind, fields)
         except _hdf5_safety.Refused as exc:
             raise ValueError(f"{name!r} {exc}") from None
@@ -80,9 +81,11 @@ def open_rows(path: PathLike, name: str) -> h5py.Dataset:
     ValueError where the file is damaged, OSError or KeyError where there is no such file or dataset.
     """
     sums = _checked(path)
-    found = _opened(path)[name]
+    dataset = _opened(path)[name]
     return (
-        found if sums is None or sums.rows is None or sums.rows[0] != name.strip("/") else _with_checksums(found, sums)
+        dataset
+        if sums is None or sums.rows is None or sums.rows[0] != name.strip("/")
+        else _with_checksums(dataset, sums)
     )
 
 
@@ -126,7 +129,30 @@ def job_of(path: PathLike) -> str | None:
         return None
 
 
-class ImageWriter:
+class _Writer:
+    """A file in the making, removed when a step of it fails."""
+
+    _unfinished: Unfinished
+
+    def abandon(self) -> None:
+        """Remove the unfinished file; `path` is as it was. Nothing happens after `close`."""
+        self._unfinished.abandon()
+
+    @contextmanager
+    def _abandoned_on_error(self) -> Iterator[None]:
+        try:
+            yield
+        except BaseException:
+            self.abandon()
+            raise
+
+    def _complete(self, fields: Mapping[str, Any]) -> None:
+        with self._unfinished.writing():
+            _put_fields(self._unfinished.file, fields)
+        self._unfinished.commit()
+
+
+class ImageWriter(_Writer):
     """An image file in the making, also for images larger than memory.
 
     grid   the fields of the ImageGrid by name; the image has the shape grid["shape"]
@@ -144,39 +170,27 @@ class ImageWriter:
         self, path: PathLike, grid: Mapping[str, Any], dtype: DTypeLike = np.complex64, resumes: bool = False
     ) -> None:
         self.path, shape = Path(path), tuple(grid["shape"])
-        self._made = Unfinished(path, "image", math.prod(shape) * np.dtype(dtype).itemsize, resumes)
-        try:
-            with self._made.writing():
-                _put_group(self._made.file, "grid", grid)
-            self.data = self._made.dataset("data", shape, dtype)
-        except BaseException:
-            self.abandon()
-            raise
+        self._unfinished = Unfinished(path, "image", math.prod(shape) * np.dtype(dtype).itemsize, resumes)
+        with self._abandoned_on_error():
+            with self._unfinished.writing():
+                _put_group(self._unfinished.file, "grid", grid)
+            self.data = self._unfinished.dataset("data", shape, dtype)
 
     def mark(self, job: str) -> None:
         """Note which job made this file, for `job_of`."""
-        with self._made.writing():
-            self._made.file.attrs["job"] = job
+        with self._unfinished.writing():
+            self._unfinished.file.attrs["job"] = job
 
     def check_open(self) -> None:
         """ValueError where the file was finished or abandoned already."""
-        if not self._made.is_open:
+        if not self._unfinished.is_open:
             raise ValueError(f"the image file {str(self.path)!r} was finished or abandoned already")
 
     def close(self, fields: Mapping[str, Any]) -> None:
         """Complete the file with all fields of the image but data and grid, and move it to its path."""
         self.check_open()
-        try:
-            with self._made.writing():
-                _put_fields(self._made.file, fields)
-            self._made.commit()
-        except BaseException:
-            self.abandon()
-            raise
-
-    def abandon(self) -> None:
-        """Remove the unfinished file; `path` is as it was. Nothing happens after `close`."""
-        self._made.abandon()
+        with self._abandoned_on_error():
+            self._complete(fields)
 
     def __enter__(self) -> ImageWriter:
         return self
@@ -185,35 +199,23 @@ class ImageWriter:
         self.abandon()
 
 
-class EchoWriter:
+class EchoWriter(_Writer):
     """A file of echoes in the making: `samples` (n_rows, n_samples), zero until written; then `close` or `abandon`."""
 
     def __init__(self, path: PathLike, n_rows: int, n_samples: int, dtype: DTypeLike = np.complex64) -> None:
         nbytes = n_rows * n_samples * np.dtype(dtype).itemsize
         self.path, self._row_bytes = Path(path), n_rows * ROW_BYTES
-        self._made = Unfinished(path, "phase_history", nbytes + self._row_bytes)
-        try:
-            self.samples = self._made.dataset("samples", (n_rows, n_samples), dtype)
-            self._made.reserve(nbytes + self._row_bytes)
-        except BaseException:
-            self.abandon()
-            raise
+        self._unfinished = Unfinished(path, "phase_history", nbytes + self._row_bytes)
+        with self._abandoned_on_error():
+            self.samples = self._unfinished.dataset("samples", (n_rows, n_samples), dtype)
+            self._unfinished.reserve(nbytes + self._row_bytes)
 
     def close(self, fields: Mapping[str, Any]) -> None:
         """Complete the file with all fields of the phase history but its samples, and move it to its path."""
-        try:
+        with self._abandoned_on_error():
             array = sum(np.size(value) for value in (fields["array"] or {}).values())
-            self._made.reserve(self._row_bytes + 16 * array + FILE_BYTES)
-            with self._made.writing():
-                _put_fields(self._made.file, fields)
-            self._made.commit()
-        except BaseException:
-            self.abandon()
-            raise
-
-    def abandon(self) -> None:
-        """Remove the unfinished file; `path` is as it was. Nothing happens after `close`."""
-        self._made.abandon()
+            self._unfinished.reserve(self._row_bytes + 16 * array + FILE_BYTES)
+            self._complete(fields)
 
 
 def _put_fields(file: h5py.File, fields: Mapping[str, Any]) -> None:
