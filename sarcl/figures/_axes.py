@@ -8,6 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 WHITE, INK, FAINT = (255, 255, 255), (38, 38, 38), (226, 226, 226)
+CURVE_WIDTH, CURVE_HEIGHT = 960, 540  # pixels of a frame of curves
+FINE = 4  # times finer than the frame, in which curves are drawn, for smooth edges
+HEADROOM = -0.04  # of the lowest level, dB: the highest one, above the peak
 
 
 class Axis(NamedTuple):
@@ -96,17 +99,41 @@ class Axes:
             draw.line([(left - self.tick, y), (left - line - 1, y)], fill=INK, width=line)
             draw.text((left - 1.7 * self.tick, y), number(t, step), INK, self.font, anchor="rm")
         self.box(self.frame)
-        turned = Image.new("L", (int(self.font.getlength(ylabel)) + u, 2 * u))
-        middle = (turned.width / 2, turned.height / 2)
-        ImageDraw.Draw(turned).text(middle, ylabel, 255, self.font, anchor="mm")
-        turned = turned.rotate(90, expand=True)
-        self.image.paste(INK, (round(0.2 * u), (top + bottom - turned.height) // 2), turned)
+        label = Image.new("L", (int(self.font.getlength(ylabel)) + u, 2 * u))
+        middle = (label.width / 2, label.height / 2)
+        ImageDraw.Draw(label).text(middle, ylabel, 255, self.font, anchor="mm")
+        label = label.rotate(90, expand=True)
+        self.image.paste(INK, (round(0.2 * u), (top + bottom - label.height) // 2), label)
 
     def box(self, frame: tuple[int, int, int, int]) -> None:
         """A thin frame just outside `frame`, so that it covers no data."""
         w = self.line
         left, top, right, bottom = frame
         self.draw.rectangle((left - w, top - w, right + w - 1, bottom + w - 1), outline=INK, width=w)
+
+
+class CurveAxes(Axes):
+    """A frame of curves from floor_db to a little above 0 dB, relative to what `reference` names."""
+
+    def __init__(self, across: Axis, reference: str, floor_db: float, title: str | None, caption: str) -> None:
+        up = Axis(f"relative to {reference} (dB)", floor_db, HEADROOM * floor_db)
+        super().__init__(CURVE_WIDTH, CURVE_HEIGHT, across, up, title, 1.5, caption)
+        self.axes(grid=True)
+
+    def curve(self, fraction: np.ndarray, db: np.ndarray, colour: tuple[int, int, int], has_dots: bool = False) -> None:
+        """A curve of levels, dB (n,), at fractions of the width (n,); has_dots: with a dot at each."""
+        from PIL import Image, ImageDraw
+
+        _, low, high, _ = self.up
+        x = fraction * CURVE_WIDTH * FINE
+        y = (high - np.clip(db, 2 * low, 2 * high)) / (high - low) * CURVE_HEIGHT * FINE
+        canvas = Image.new("L", (CURVE_WIDTH * FINE, CURVE_HEIGHT * FINE))
+        draw = ImageDraw.Draw(canvas)
+        points = list(zip(x.tolist(), y.tolist(), strict=True))
+        draw.line(points, fill=255, width=9, joint="curve")
+        for px, py in points if has_dots else ():
+            draw.ellipse((px - 14, py - 14, px + 14, py + 14), fill=255)
+        self.image.paste(colour, self.frame[:2], canvas.reduce(FINE))
 
 
 def wrapped(text: str, room: float, length: Callable[[str], float]) -> list[str]:
