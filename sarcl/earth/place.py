@@ -34,13 +34,7 @@ class Place:
 
     @classmethod
     def above(
-        cls,
-        longitude: float,
-        latitude: float,
-        height: float = 0.0,
-        *,
-        heights: str = "ellipsoid",
-        geoid: Geoid = None,
+        cls, longitude: float, latitude: float, height: float = 0.0, *, heights: str = "ellipsoid", geoid: Geoid = None
     ) -> Place:
         """A place whose height is above what `heights` names, as in `Scene.from_dem`.
 

@@ -85,9 +85,9 @@ class Noisy(RowsOnDemand):
         self.source, self.deviation, self.profile, self.seed = source, deviation, shape, seed
         self.shape, self.dtype = source.shape, np.dtype(source.dtype)
 
-    def rows(self, some: slice) -> np.ndarray:
-        index = np.arange(self.shape[0])[some]
-        clean = np.asarray(self.source[some])
+    def rows(self, rows: slice) -> np.ndarray:
+        index = np.arange(self.shape[0])[rows]
+        clean = np.asarray(self.source[rows])
         noise = complex_gaussian(index, self.shape[1], self.seed) * (self.deviation[index, None] * self.profile)
         return (clean + noise).astype(self.dtype.newbyteorder("="))
 

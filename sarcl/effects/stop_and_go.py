@@ -137,11 +137,11 @@ class _Chirped(RowsOnDemand):
         self.center, self.rate = raw.waveform.center, raw.waveform.sweep_rate
         self.shape, self.dtype = raw.samples.shape, np.dtype(raw.samples.dtype)
 
-    def rows(self, some: slice) -> np.ndarray:
-        f = self.first[some, None] + self.step[some, None] * np.arange(self.shape[1])
-        moved = f * self.slope[some, None]
+    def rows(self, rows: slice) -> np.ndarray:
+        f = self.first[rows, None] + self.step[rows, None] * np.arange(self.shape[1])
+        moved = f * self.slope[rows, None]
         phase = np.pi * moved * (2 * (f - self.center) + moved) / self.rate
-        block = np.asarray(self.source[some])
+        block = np.asarray(self.source[rows])
         return (block * np.exp(-1j * self.sign * phase)).astype(self.dtype.newbyteorder("="))
 
 

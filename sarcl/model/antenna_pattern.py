@@ -47,12 +47,12 @@ def table_limits(antenna: Antenna, level: float, ratio: float) -> tuple[float, f
     """Largest direction cosines along azimuth and elevation where a table reaches `level`; and -1 if never behind."""
     a, e = _fine(antenna.azimuth), _fine(antenna.elevation)
     power = sum(s(a, e) ** 2 for s in splines(antenna))
-    seen = power >= level**2
-    if not seen.any():
+    is_above = power >= level**2
+    if not is_above.any():
         return 0.0, 0.0, -1.0
     # margin: half a cell of the finer grid, between its samples, and rounding
-    azimuth = np.minimum(np.abs(a) / ratio + (a[1] - a[0]) / ratio, np.pi)[seen.any(axis=1)].max()
-    elevation = np.minimum(np.abs(e) / ratio + (e[1] - e[0]) / ratio, np.pi / 2)[seen.any(axis=0)].max()
+    azimuth = np.minimum(np.abs(a) / ratio + (a[1] - a[0]) / ratio, np.pi)[is_above.any(axis=1)].max()
+    elevation = np.minimum(np.abs(e) / ratio + (e[1] - e[0]) / ratio, np.pi / 2)[is_above.any(axis=0)].max()
     return float(np.sin(min(azimuth, np.pi / 2))), float(np.sin(elevation)), -float(azimuth < np.pi / 2)
 
 
@@ -127,9 +127,13 @@ def _parts(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def two_way_gain(
-    antennas: tuple[Antenna, Antenna | None], axes: tuple[np.ndarray, np.ndarray], tx: np.ndarray, rx: np.ndarray,
-    points: np.ndarray, frequency: float,
-) -> np.ndarray:  # fmt: skip
+    antennas: tuple[Antenna, Antenna | None],
+    axes: tuple[np.ndarray, np.ndarray],
+    tx: np.ndarray,
+    rx: np.ndarray,
+    points: np.ndarray,
+    frequency: float,
+) -> np.ndarray:
     """Transmit times receive gain (n_points,), one antenna pair: positions m (3,), axes (3, 3), points m (n, 3).
 
     antennas  from `antenna.pair_of`; d @ axes are the components of a direction d along the columns of axes

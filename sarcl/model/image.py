@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,11 +22,6 @@ if TYPE_CHECKING:
     from ..base.types import LazyRows, PathLike
 
 FRAMES = ("local", "earth-fixed")
-# all fields but data and grid, as files hold them
-FIELDS = (
-    "gain", "frequency", "tx", "rx", "report", "tx_velocity", "rx_velocity", "time", "band", "window", "polarization",
-    "frame", "aperture",
-)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,8 +123,8 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
     __hash__ = object.__hash__
 
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> np.ndarray:
-        made = np.asarray(self.data, dtype)
-        return np.array(made) if copy else made
+        pixels = np.asarray(self.data, dtype)
+        return np.array(pixels) if copy else pixels
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: object, **options: object) -> Any:
         return getattr(ufunc, method)(*(np.asarray(i) if isinstance(i, Image) else i for i in inputs), **options)
@@ -182,8 +177,8 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
         """20 log10 |data/gain| (10 log10 of an intensity over gain^2), dB, float32; -inf where data is 0."""
         data = np.asarray(self.data)
         if not self.is_complex and (data < 0).any():
-            at = [int(i) for i in np.unravel_index(int(np.argmin(data)), data.shape)]
-            raise ValueError(f"image data{at} is {data.min():g}; an intensity is not negative")
+            pixel = [int(i) for i in np.unravel_index(int(np.argmin(data)), data.shape)]
+            raise ValueError(f"image data{pixel} is {data.min():g}; an intensity is not negative")
         gain = np.where(self.gain > 0, self.gain, 1) if isinstance(self.gain, np.ndarray) else self.gain
         with np.errstate(divide="ignore"):
             if self.is_complex:
@@ -257,20 +252,20 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
                                       Description say what white and black are;  title  above the picture
         On any exception `path` is as it was.
         """
-        among = formats.writing("picture", "image")
-        form = formats.named(arguments.path("path", path), among)
+        image_formats = formats.writing("picture", "image")
+        form = formats.named(arguments.path("path", path), image_formats)
         if form is None:
-            wanted = formats.suggested(among, "'")
-            raise ValueError(f"image path {str(path)!r} {formats.ending_of(path)}; choose {wanted}")
+            endings = formats.suggested(image_formats, "'")
+            raise ValueError(f"image path {str(path)!r} {formats.ending_of(path)}; choose {endings}")
         if form.is_picture:
             from ..figures.decibels import write_png
 
             write_png(self._picture(floor_db, top_db, percentile, title), path)
             return
-        with form.functions.ImageWriter(path, formats.fields_of(self.grid), self.data.dtype) as out:
-            for a, b in hdf5.blocks(out.data):
-                out.data[a:b] = np.asarray(self.data[a:b])
-            out.close(image_fields(self))
+        with form.functions.ImageWriter(path, formats.fields_of(self.grid), self.data.dtype) as writer:
+            for a, b in hdf5.blocks(writer.data):
+                writer.data[a:b] = np.asarray(self.data[a:b])
+            writer.close(image_fields(self))
 
     def _picture(
         self, floor_db: float, top_db: float | None = None, percentile: float | None = None, title: str | None = None
@@ -299,9 +294,19 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
             i, j = np.unravel_index(int(np.argmin(db < np.inf)), db.shape)
             raise ValueError(f"image data[{i}, {j}] is {np.asarray(self.data)[i, j]}; a picture needs finite pixels")
         return picture(
-            db, spacing, floor_db, title, top_db=top_db, percentile=percentile,
-            zero="a unit point in focus", origin=origin, names=names,
-        )  # fmt: skip
+            db,
+            spacing,
+            floor_db,
+            title,
+            top_db=top_db,
+            percentile=percentile,
+            zero="a unit point in focus",
+            origin=origin,
+            names=names,
+        )
+
+
+FIELDS = tuple(f.name for f in fields(Image) if f.name not in ("data", "grid"))  # as files hold them
 
 
 def _checked_gain(gain: object, grid: ImageGrid) -> float | NDArray[np.floating]:

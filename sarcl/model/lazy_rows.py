@@ -58,30 +58,30 @@ class RowsOnDemand(ABC):
     dtype: np.dtype[Any]
 
     @abstractmethod
-    def rows(self, some: slice) -> np.ndarray:
+    def rows(self, rows: slice) -> np.ndarray:
         """The rows of a slice of step 1, whose ends lie within the rows."""
 
     def __getitem__(self, index: Any) -> np.ndarray:
-        """What NumPy gives for this index of all rows; slices of rows alone, and single rows, read no others."""
+        """Values as NumPy indexes all rows; slices of rows alone, and single rows, read no others."""
         rows, *others = index if isinstance(index, tuple) else (index,)
         if others or isinstance(rows, slice):
             arguments.checked_index("index", "samples", index, self.shape)
         if isinstance(rows, slice):
-            taken = range(*rows.indices(self.shape[0]))
-            if len(taken) == 0:
-                made = np.empty((0, *self.shape[1:]), self.dtype)
+            steps = range(*rows.indices(self.shape[0]))
+            if len(steps) == 0:
+                block = np.empty((0, *self.shape[1:]), self.dtype)
             else:
-                low, high = min(taken[0], taken[-1]), max(taken[0], taken[-1])
-                made = self.rows(slice(low, high + 1))[:: taken.step]
-            return made[(slice(None), *others)] if others else made
+                low, high = min(steps[0], steps[-1]), max(steps[0], steps[-1])
+                block = self.rows(slice(low, high + 1))[:: steps.step]
+            return block[(slice(None), *others)] if others else block
         if isinstance(rows, (int, np.integer)) and not isinstance(rows, (bool, np.bool_)):
-            at = int(rows) + (self.shape[0] if rows < 0 else 0)
-            if not 0 <= at < self.shape[0]:
+            row = int(rows) + (self.shape[0] if rows < 0 else 0)
+            if not 0 <= row < self.shape[0]:
                 raise IndexError(
                     f"row {rows} was requested, but there are {self.shape[0]}; give one from {-self.shape[0]} to "
                     f"{self.shape[0] - 1}"
                 )
-            return np.asarray(self.rows(slice(at, at + 1))[(0, *others)])
+            return np.asarray(self.rows(slice(row, row + 1))[(0, *others)])
         arguments.checked_index("index", "samples", index, self.shape)
         return np.asarray(self.rows(slice(0, self.shape[0]))[index])
 
@@ -97,8 +97,8 @@ class Picked(RowsOnDemand):
         self.shape = (len(index), *source.shape[1:])
         self.dtype = source.dtype
 
-    def rows(self, some: slice) -> np.ndarray:
-        index = self.index[some]
+    def rows(self, rows: slice) -> np.ndarray:
+        index = self.index[rows]
         runs = np.split(index, np.flatnonzero(np.diff(index) != 1) + 1)
         return np.concatenate([np.asarray(self.source[int(r[0]) : int(r[-1]) + 1]) for r in runs])
 
@@ -112,8 +112,8 @@ class Stacked(RowsOnDemand):
         self.shape = (int(self.first[-1]), *sources[0].shape[1:])
         self.dtype = np.result_type(*(s.dtype for s in sources))
 
-    def rows(self, some: slice) -> np.ndarray:
-        start, stop, _ = some.indices(self.shape[0])
+    def rows(self, rows: slice) -> np.ndarray:
+        start, stop, _ = rows.indices(self.shape[0])
         out = np.empty((stop - start, *self.shape[1:]), self.dtype)
         for first, source in zip(self.first.tolist(), self.sources, strict=False):
             a, b = max(start, first), min(stop, first + source.shape[0])
@@ -129,8 +129,8 @@ class Scaled(RowsOnDemand):
         self.source, self.factor = source, factor.astype(np.result_type(source.dtype, np.complex64))
         self.shape, self.dtype = source.shape, self.factor.dtype
 
-    def rows(self, some: slice) -> np.ndarray:
-        return np.asarray(self.source[some]) * self.factor[some, None]
+    def rows(self, rows: slice) -> np.ndarray:
+        return np.asarray(self.source[rows]) * self.factor[rows, None]
 
 
 class Tapered(RowsOnDemand):
@@ -140,8 +140,8 @@ class Tapered(RowsOnDemand):
         self.source, self.factors = source, factors.astype(np.float32)
         self.shape, self.dtype = source.shape, source.dtype
 
-    def rows(self, some: slice) -> np.ndarray:
-        return np.asarray(self.source[some]) * self.factors
+    def rows(self, rows: slice) -> np.ndarray:
+        return np.asarray(self.source[rows]) * self.factors
 
 
 class Columns(RowsOnDemand):
@@ -152,5 +152,5 @@ class Columns(RowsOnDemand):
         self.shape = (source.shape[0], last - first)
         self.dtype = source.dtype
 
-    def rows(self, some: slice) -> np.ndarray:
-        return np.asarray(self.source[some])[:, self.columns]
+    def rows(self, rows: slice) -> np.ndarray:
+        return np.asarray(self.source[rows])[:, self.columns]

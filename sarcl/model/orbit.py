@@ -98,10 +98,16 @@ class Orbit:
         ValueError for an eccentricity outside [0, 1), and a perigee below the Earth's surface.
         """
         zero = None if epoch is None else date(epoch)
-        path = KeplerElements.checked(
-            semi_major_axis, eccentricity, inclination, node, argument_of_perigee, mean_anomaly,
-            greenwich=0.0 if zero is None else rotation.sidereal_time(zero), j2=j2,
-        )  # fmt: skip
+        path = KeplerElements(
+            semi_major_axis=semi_major_axis,
+            eccentricity=eccentricity,
+            inclination=inclination,
+            node=node,
+            perigee=argument_of_perigee,
+            anomaly=mean_anomaly,
+            greenwich=0.0 if zero is None else rotation.sidereal_time(zero),
+            with_j2=j2,
+        )
         half = np.pi / path.mean_motion
         return cls(path, (-half, half) if span is None else span_of(span), zero)
 
@@ -188,10 +194,10 @@ class Orbit:
         if (n_pulses is None) == (duration is None):
             raise ValueError("the length of the track is n_pulses or duration (s); give one of them")
         if duration is not None:
-            wanted = validation.number("duration", duration, above=0) * prf
-            what = f"a track of duration {duration:g} s with {wanted:.3g} pulses"
-            validation.room(what, BYTES_PER_PULSE * wanted, "give a shorter duration or a lower prf")
-            n_pulses = max(1, round(wanted))
+            n_intervals = validation.number("duration", duration, above=0) * prf
+            what = f"a track of duration {duration:g} s with {n_intervals:.3g} pulses"
+            validation.room(what, BYTES_PER_PULSE * n_intervals, "give a shorter duration or a lower prf")
+            n_pulses = max(1, round(n_intervals))
         n_pulses = validation.count("n_pulses", n_pulses)
         validation.room(f"a track of {n_pulses:.3g} pulses", BYTES_PER_PULSE * float(n_pulses), "give fewer pulses")
         if (start is None) == (center is None):
@@ -254,8 +260,8 @@ class Orbit:
         validation.finite("heights", levels)
         times, ranges, levels = together(t=times, r=ranges, heights=levels)
         p, v = self._at(times.ravel())
-        found = zero_doppler.geolocate(p, v, ranges.ravel(), levels.ravel() if model is None else model, sign)
-        return found.reshape(*times.shape, 3)
+        x = zero_doppler.geolocate(p, v, ranges.ravel(), levels.ravel() if model is None else model, sign)
+        return x.reshape(*times.shape, 3)
 
     def view(self, t: ArrayLike, positions: ArrayLike) -> viewing.View:
         """How the satellite at times, s (...), sees Earth-fixed positions, m (..., 3): angles, ranges, Doppler."""
@@ -326,10 +332,10 @@ class Orbit:
         start, stop = self.span
         outside = (times < start - ROUNDING) | (times > stop + ROUNDING)
         if outside.any():
-            at = np.unravel_index(int(np.argmax(outside)), times.shape)
-            where = f"[{', '.join(str(int(i)) for i in at)}]" if at else ""
+            index = np.unravel_index(int(np.argmax(outside)), times.shape)
+            shown = f"[{', '.join(str(int(i)) for i in index)}]" if index else ""
             raise ValueError(
-                f"t{where} = {times[at]:.9g} s is outside the orbit, which reaches from {start:.9g} to {stop:.9g} s "
+                f"t{shown} = {times[index]:.9g} s is outside the orbit, which reaches from {start:.9g} to {stop:.9g} s "
                 f"after {'its epoch' if self.epoch is None else self.epoch}; give times within it"
             )
         return np.asarray(np.clip(times, start, stop))

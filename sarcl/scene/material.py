@@ -218,11 +218,7 @@ def resolve(
         )
     elif given.dtype.kind in "iuf":
         value = _reflectivity(given)
-        return (
-            np.broadcast_to(np.int32(0), shape),
-            np.broadcast_to(value, shape),
-            (METAL,),
-        )
+        return (np.broadcast_to(np.int32(0), shape), np.broadcast_to(value, shape), (METAL,))
     elif given.dtype.kind == "U":
         words, index = np.unique(given, return_inverse=True)
         index, kinds = index.reshape(given.shape), [_one(str(word), names) for word in words]
@@ -232,11 +228,7 @@ def resolve(
         index, kinds = index.reshape(given.shape), [_one(m, names) for m in places]
     table, place = merge([[m for m, _ in kinds]])
     factor = np.array([r for _, r in kinds])
-    return (
-        np.broadcast_to(place[0][index].astype(np.int32), shape),
-        np.broadcast_to(factor[index], shape),
-        table,
-    )
+    return (np.broadcast_to(place[0][index].astype(np.int32), shape), np.broadcast_to(factor[index], shape), table)
 
 
 def merge(tables: Sequence[Sequence[Material]]) -> tuple[tuple[Material, ...], list[np.ndarray]]:

@@ -219,12 +219,7 @@ class Scene:
             raise ValueError(
                 f"all {len(placed)} facets are degenerate (zero area); nothing would reflect: check the {what}"
             )
-        scene = cls.facets(
-            placed,
-            **parts,
-            roughness=roughness,
-            two_sided=not loaded.closed,
-        )
+        scene = cls.facets(placed, **parts, roughness=roughness, two_sided=not loaded.closed)
         return scene if max_edge is None else scene.split(max_edge)
 
     @classmethod
