@@ -56,8 +56,8 @@ class Place:
                 f"the height is above {heights!r}, not above the ellipsoid; give the undulation as geoid: a number "
                 "(m), or a raster file of it"
             )
-        at = np.array([[place.longitude]]), np.array([[place.latitude]])
-        rise = elevation.undulation(geoid, *at, "the place", heights)
+        degrees = np.array([[place.longitude]]), np.array([[place.latitude]])
+        rise = elevation.undulation(geoid, *degrees, "the place", heights)
         return cls(place.longitude, place.latitude, place.height + float(rise[0, 0]))
 
     @cached_property

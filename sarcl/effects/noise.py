@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,9 +17,9 @@ from ..model.image_grid import ImageGrid
 from ..model.lazy_rows import RowsOnDemand
 from ..model.phase_history import PhaseHistory
 from ..model.radar import Radar, noise_variance
-from .noise_level import level_of
 
 MOST_DECIBELS = 300.0  # of noise
+LEVELS = ("nesz_db", "nesz", "temperature", "radar", "variance")  # arguments of add_noise
 STREAM = 0x6E6F697365  # of random numbers: independent of those of roughness and speckle with the same seed
 
 
@@ -51,9 +53,9 @@ def add_noise(
     """
     instance("raw", raw, PhaseHistory)
     seed = count("seed", seed, 0)
-    given = {"nesz_db": nesz_db, "nesz": nesz, "temperature": temperature, "radar": radar, "variance": variance}
-    if level_of(given) not in ("nesz", "nesz_db") and (grid is not None or cell_area is not None):
-        raise ValueError(f"{level_of(given)} is the level of samples; grid and cell_area go with nesz or nesz_db")
+    levels = {"nesz_db": nesz_db, "nesz": nesz, "temperature": temperature, "radar": radar, "variance": variance}
+    if level_of(levels) not in ("nesz", "nesz_db") and (grid is not None or cell_area is not None):
+        raise ValueError(f"{level_of(levels)} is the level of samples; grid and cell_area go with nesz or nesz_db")
     if nesz is not None and not number("nesz", nesz) > 0:
         raise ValueError(f"nesz is {nesz:g}, wanted a ratio above 0, m^2/m^2; in decibels it is nesz_db={nesz:g}")
     if nesz is not None or nesz_db is not None:
@@ -70,12 +72,20 @@ def add_noise(
     return replace(raw, samples=Noisy(raw.samples, np.sqrt(level), shape, seed))
 
 
+def level_of(levels: Mapping[str, Any]) -> str:
+    """The name of the one level among the arguments of `add_noise`; ValueError where there is none, or several."""
+    names = [name for name in LEVELS if levels.get(name) is not None]
+    if len(names) != 1:
+        raise ValueError(f"noise has one level; give one of {', '.join(LEVELS)}, got {', '.join(names) or 'none'}")
+    return names[0]
+
+
 def _power(decibels: object) -> float:
     """A power ratio, of dB within those of float32."""
-    given = number("nesz_db", decibels)
-    if abs(given) > MOST_DECIBELS:
-        raise ValueError(f"nesz_db is {given:g}; levels reach from {-MOST_DECIBELS:g} to {MOST_DECIBELS:g} dB")
-    return float(10 ** (given / 10))
+    level = number("nesz_db", decibels)
+    if abs(level) > MOST_DECIBELS:
+        raise ValueError(f"nesz_db is {level:g}; levels reach from {-MOST_DECIBELS:g} to {MOST_DECIBELS:g} dB")
+    return float(10 ** (level / 10))
 
 
 class Noisy(RowsOnDemand):

@@ -151,9 +151,12 @@ def sphere(
 
 
 def tank(
-    size: ArrayLike = _tank.SIZE, *, edge: float | None = None, sections: int | None = None,
+    size: ArrayLike = _tank.SIZE,
+    *,
+    edge: float | None = None,
+    sections: int | None = None,
     **options: Unpack[ClosedOptions],
-) -> Scene:  # fmt: skip
+) -> Scene:
     """A tank of overall size (x, y, z), m, its gun forward along x: the complex target of Zou et al. 2021, table 2.
 
     Closed bodies that overlap: hull with a sloped front, tracks, side boxes, turret, gun, cupola with a mast, drums at
@@ -194,9 +197,9 @@ def _placed(
 
 
 def _length(name: str, value: object) -> float:
-    out = validation.number(name, value, above=0)
-    geometry.check_reach(name, np.array(out))
-    return out
+    length = validation.number(name, value, above=0)
+    geometry.check_reach(name, np.array(length))
+    return length
 
 
 def _dimensions(name: str, size: ArrayLike, n: int) -> list[float]:
