@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,9 +15,9 @@ from ..model.image_grid import ImageGrid
 from ..model.lazy_rows import RowsOnDemand
 from ..model.phase_history import PhaseHistory
 from ..model.radar import Radar, noise_variance
+from .noise_level import level_of
 
 MOST_DECIBELS = 300.0  # of noise
-LEVELS = ("nesz_db", "nesz", "temperature", "radar", "variance")  # arguments of add_noise
 STREAM = 0x6E6F697365  # of random numbers: independent of those of roughness and speckle with the same seed
 
 
@@ -70,14 +68,6 @@ def add_noise(
         raise ValueError(f"variance[{int(np.argmin(level))}] is {level.min():g}; it cannot be negative")
     shape = _filtered(raw) if raw.compressed else np.ones(raw.n_samples)
     return replace(raw, samples=Noisy(raw.samples, np.sqrt(level), shape, seed))
-
-
-def level_of(levels: Mapping[str, Any]) -> str:
-    """The name of the one level among the arguments of `add_noise`; ValueError where there is none, or several."""
-    names = [name for name in LEVELS if levels.get(name) is not None]
-    if len(names) != 1:
-        raise ValueError(f"noise has one level; give one of {', '.join(LEVELS)}, got {', '.join(names) or 'none'}")
-    return names[0]
 
 
 def _power(decibels: object) -> float:
