@@ -23,7 +23,7 @@ from ._view import Ends, ends_at
 CHIP = 32  # pixels on each side of the point from whose spectrum the occupied band is determined
 LEAST = 8  # pixels on each side that a spectrum needs at least
 BAND = 0.42  # cycles per pixel, largest occupied band: the kernel's transition takes the rest of 0.5
-FALL = 1e-3  # of the largest spectral density: the band ends where the density stays below it
+FALL = 1e-3  # spectral density over its largest value, below which the band ends
 SHRINK = 0.9  # factor by which a cut is shortened whose ends lie too near to the border of a grid of terrain
 KAISER = 8.96, 5.715  # shape, and pixels times transition width, for 90 dB by Kaiser's formulas
 

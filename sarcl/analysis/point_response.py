@@ -32,7 +32,7 @@ MARGIN = 18  # pixels that the interpolator may need on each side
 STEPS = 32  # points of a cut per IRW
 FARTHEST = 12  # steps, three pixels of the widest spacing: the peak is nearer to the brightest pixel
 MOST_STEPS = 40  # along both axes, of one length
-FINER = 4  # of the last steps: the response is no parabola over the first
+FINER = 4  # ratio of the first steps to the last ones: the response is no parabola over the first
 STRAIGHT = 0.98  # cosine of the angle to a cut within which something lies "in range" or "in cross-range"
 NAMES = "range", "cross-range"
 

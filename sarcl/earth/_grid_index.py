@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..base import wgs84
 
 ITERATIONS = 30
-FOUND = 1e-6  # of a cell: positions that the iteration leaves farther away are outside the grid
+FOUND = 1e-6  # step of the iteration, in cells, at which a position is found; others lie outside the grid
 SAME = 1.2e-13  # degrees, 1.3e-8 m, twice the rounding of longitudes up to 360: positions nearer to a point are at it
 ANTIPODE = -1 + 1e-9  # cosine of the angle from the middle: beyond, stereographic coordinates are set to 1e6
 POLAR = 80.0  # degrees of latitude

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ..base.types import PathLike
 
 FARTHEST = 1e6  # degrees: more is no place
-SAME = 1e-9  # of a cell: positions nearer to a point are at it
+SAME = 1e-9  # distance to a point, in cells, below which a position is at it
 HIGHEST = 20e3  # m: the Earth's surface reaches from -10 935 to 8849
 
 

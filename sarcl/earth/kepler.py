@@ -107,7 +107,7 @@ class KeplerElements:
         return positions, velocities
 
     def describe(self) -> str:
-        """How positions are computed."""
+        """Words for the computation of positions."""
         drift = "with the secular drift of J2" if self.with_j2 else "without perturbations"
         return f"Kepler elements {drift}, in closed form"
 

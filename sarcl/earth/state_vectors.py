@@ -14,12 +14,12 @@ LEAST_STATES = 4
 # Numbers of states per interpolation, cheapest first: Hermite uses velocities too, Lagrange positions alone.
 HERMITE, LAGRANGE = (2, 3, 4, 5, 6, 7, 8), (4, 6, 8, 10, 12, 14)
 ORDER_MARGIN = 1.5  # ratio to the least error of all orders: the cheapest order within it is taken
-FINE = 1e-7  # m, of an interpolation: an error so small needs no higher order
+FINE = 1e-7  # interpolation error, m, that needs no higher order
 WORST = 1.0  # m: states that do not fit their neighbours better are refused
 VELOCITY_MISFIT = 1.0  # m/s: the same of velocities
 DEEPEST = -20e3  # m: positions farther below the ellipsoid are refused
 MISFIT = 0.01  # error of accelerations over gravity and the Earth's rotation: J2 causes 0.003
-INERTIAL = 0.004  # as MISFIT, where the states accelerate as in an inertial frame
+INERTIAL = 0.004  # the same error where the states accelerate as in an inertial frame
 GAP = 2.1  # ratio of a gap to the usual spacing: leaving out a state measures the error over twice the spacing
 BLOCK = 32_768  # times that are interpolated at once
 
@@ -89,7 +89,7 @@ class StateVectors:
         return positions, velocities
 
     def describe(self) -> str:
-        """How positions are computed, and the error that was measured."""
+        """Words for the computation of positions and its measured error."""
         step = np.median(np.diff(self.times))
         kind, used = ("Hermite", " and velocities") if self.hermite else ("Lagrange", "")
         degree = 2 * self.n_nodes - 1 if self.hermite else self.n_nodes - 1

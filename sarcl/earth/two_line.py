@@ -92,7 +92,7 @@ class TwoLineElements:
         return interpolate(np.asarray(steps * STEP), fixed[inverse], None, times)
 
     def describe(self) -> str:
-        """How positions are computed."""
+        """Words for the computation of positions."""
         return (
             f"SGP4 of the two-line elements of {self.epoch} (TEME), rotated by Greenwich mean sidereal time; "
             f"interpolated between positions {STEP:g} s apart"

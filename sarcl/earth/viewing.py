@@ -1,4 +1,4 @@
-"""What an antenna above the Earth sees of positions: angles, ranges and Doppler frequencies."""
+"""Angles, ranges and Doppler frequencies of positions seen from an antenna above the Earth."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..base.constants import SPEED_OF_LIGHT
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """How an antenna sees positions, one value for each (...).
+    """Angles, ranges and their derivatives of positions seen from an antenna, one value for each (...).
 
     slant_range   m;  ground_range  m, along the ellipsoid from the point below the antenna
     incidence     rad, at the position, from the ellipsoid's normal to the antenna

@@ -17,7 +17,7 @@ from .viewing import hidden, normal
 States = Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], NDArray[np.float64]]]
 
 COARSE = 60.0  # s: least time between zero-Doppler times of any orbit is half a revolution, 40 minutes
-PAIRS = 4_000_000  # of positions and coarse times that are examined at once
+PAIRS = 4_000_000  # pairs of positions and coarse times that are examined at once
 DOUBT = 50e3  # m: of passes whose first ranges differ by less, all zero-Doppler times are computed
 EXACT = 1e-12  # s: below it, times follow the rounding of positions, 1e-9 m
 EARLY = 1e-9  # s: a zero-Doppler time outside the span by less counts as its end

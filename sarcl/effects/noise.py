@@ -17,8 +17,8 @@ from ..model.phase_history import PhaseHistory
 from ..model.radar import Radar, noise_variance
 from .noise_level import level_of
 
-MOST_DECIBELS = 300.0  # of noise
-STREAM = 0x6E6F697365  # of random numbers: independent of those of roughness and speckle with the same seed
+MOST_DECIBELS = 300.0  # largest level of noise, dB: amplitudes stay within float32
+STREAM = 0x6E6F697365  # stream of random numbers: independent of those of roughness and speckle with the same seed
 
 
 def add_noise(

@@ -14,7 +14,7 @@ from ..model.trajectory import Trajectory
 from ..model.waveform import Waveform
 
 ITERATIONS = 60  # half the change after each: 1e-18 of the first remains
-ROUNDING = 1e-14  # of coordinates and delays: smaller changes are rounding, which iterations need not reduce
+ROUNDING = 1e-14  # relative change of coordinates and delays that is rounding, which iterations need not reduce
 
 
 @dataclass(frozen=True, eq=False)

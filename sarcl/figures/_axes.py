@@ -10,7 +10,7 @@ import numpy as np
 WHITE, INK, FAINT = (255, 255, 255), (38, 38, 38), (226, 226, 226)
 CURVE_WIDTH, CURVE_HEIGHT = 960, 540  # pixels of a frame of curves
 FINE = 4  # times finer than the frame, in which curves are drawn, for smooth edges
-HEADROOM = -0.04  # of the lowest level, dB: the highest one, above the peak
+HEADROOM = -0.04  # ratio of the highest level, dB above the peak, to the lowest one
 
 
 class Axis(NamedTuple):

@@ -22,7 +22,7 @@ CURVE = (22, 82, 148)  # colour of a line plot
 LINE_SAMPLES = 10  # samples per pixel of a line plot, at most: more are averaged
 MOST_DOTS = 64  # samples of a line plot that are shown as dots too
 PNG_NOISE, PNG_AXES = 2.2, 6e4  # bytes per pixel of noise, and of axes, caption and scale
-MOST_DECIBELS = 1e4  # of levels: float64 holds powers from -3200 to 3100 dB
+MOST_DECIBELS = 1e4  # largest level, dB: float64 holds powers from -3200 to 3100 dB
 PERCENTILE = 99.5  # default of white: one in 200 pixels of the scene is clipped
 # Levels that tell a scene from an object in front of nothing, dB. FILLED: largest difference of percentile 99.5 and the
 # median in a scene. It is 9 dB for speckle and about 20 with shadows, but over 40 for the side lobes of a lone point.

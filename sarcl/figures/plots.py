@@ -21,11 +21,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FLOOR_DB = -40.0  # dB, black below white
-SIZE, DPI = (5.6, 4.0), 120  # of a figure, inches; pixels per inch
-LEFT, BOTTOM, WIDTH, HEIGHT = 0.14, 0.13, 0.83, 0.83  # of the axes, relative to the figure
-GREY_WIDTH = 0.76  # of a picture with its scale, relative to the figure
-SCALE_SHARE, SCALE_GAP = 0.11, 0.03  # of it: scale and gap together, and the gap alone
-LOWEST, HIGHEST = 2.4, 5.4  # of a picture whose axes have equal units, inches
+SIZE, DPI = (5.6, 4.0), 120  # size of a figure, inches; pixels per inch
+LEFT, BOTTOM, WIDTH, HEIGHT = 0.14, 0.13, 0.83, 0.83  # place of the axes, relative to the figure
+GREY_WIDTH = 0.76  # width of a picture with its scale, relative to the figure
+SCALE_SHARE, SCALE_GAP = 0.11, 0.03  # widths over that one: scale and gap together, and the gap alone
+LOWEST, HIGHEST = 2.4, 5.4  # heights of a picture whose axes have equal units, inches
 LEGEND_LINE = 0.055  # height of a line of the legend above the axes, relative to the figure
 COLORS = ("#1f4e9c", "#c0392b", "#1d8348", "#8e44ad", "#b9770e", "#34495e")
 LINES: tuple[Any, ...] = ("-", "--", "-.", ":", (0, (7, 2)), (0, (4, 1, 1, 1, 1, 1)))

@@ -55,7 +55,7 @@ class CheckedRows(h5py.Dataset):
         return self._read(args, new_dtype)
 
     def read_direct(self, dest: Any, source_sel: Any = None, dest_sel: Any = None) -> None:
-        """As of h5py.Dataset."""
+        """The method of h5py.Dataset, after the check of all rows."""
         for start in range(0, self.shape[0], self._sums.step):
             if not self._good[block := start // self._sums.step]:
                 self._compare(self._read(slice(start, min(start + self._sums.step, self.shape[0]))), block)

@@ -104,7 +104,7 @@ def crc_of(values: np.ndarray, start: int = 0) -> int:
 
 
 def layout(file: h5py.File, size: int, rows: str, sums: RunningSums | None) -> Checksums:
-    """Where the arrays of an open HDF5 file lie, and the CRCs of its rows; `complete` adds the others."""
+    """Places of the arrays in an open HDF5 file, and the CRCs of its rows; `append` adds those of the arrays."""
     import h5py
 
     arrays: list[tuple[str, int, int, int]] = []

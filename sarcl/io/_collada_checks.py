@@ -1,4 +1,4 @@
-"""What a COLLADA file (.dae) holds that trimesh would leave out or cover wrongly in silence: refused."""
+"""Surfaces of COLLADA files (.dae) that trimesh would leave out or cover wrongly in silence: refused."""
 
 from __future__ import annotations
 

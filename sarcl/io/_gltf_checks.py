@@ -1,4 +1,4 @@
-"""What a glTF 2.0 file needs that its reader would leave out in silence: refused (Khronos, sections 3.6 and 3.7)."""
+"""Surfaces of glTF 2.0 files that their reader would leave out in silence: refused (Khronos, sections 3.6, 3.7)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an HDF5 file may do to its reader: lead into other files, declare sizes that it does not have, never end."""
+"""HDF5 files that lead into other files, declare sizes that they do not have, or never end: refused."""
 
 from __future__ import annotations
 
@@ -87,10 +87,8 @@ def check_contents(file: h5py.File, file_bytes: int, external: bool, how: str = 
             check_external(f"{name} lies", member.external[0][0])
             return
         declared = int(member.size or 0) * member.dtype.itemsize
-        largest = (
-            file_bytes * (DEFLATED if member.chunks and member.id.get_create_plist().get_nfilters() else 1) + ALLOWED
-        )
-        if declared > largest:
+        is_packed = member.chunks and member.id.get_create_plist().get_nfilters()
+        if declared > file_bytes * (DEFLATED if is_packed else 1) + ALLOWED:
             raise Refused(
                 f"is damaged: it declares {size_text(declared)} for {name} {member.shape} and has "
                 f"{size_text(file_bytes)}; save or copy it again"

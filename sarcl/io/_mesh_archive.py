@@ -58,5 +58,5 @@ def beside(files: dict[str, bytes], name: str) -> dict[str, bytes]:
 
 
 def _of_macos(name: str) -> bool:
-    """What macOS adds to archives: attributes of each file, under its name."""
+    """Whether macOS added a file to an archive: attributes of another one, under its name."""
     return name.startswith("__MACOSX/") or Path(name).name.startswith("._")

@@ -1,4 +1,4 @@
-"""What a mesh file declares, compared with what it holds; and polygons, as fans of triangles where these cover them.
+"""Faces that a mesh file declares and holds; and polygons, as fans of triangles where these cover them.
 
 trimesh reads what it finds of a truncated text file, and covers every polygon by a fan about its first corner.
 """
@@ -11,7 +11,7 @@ import re
 import numpy as np
 
 HEAD = 2**16  # bytes in which a header ends
-FLAT = 1e-9  # of a polygon's area: a triangle of a fan that is turned by less is a line
+FLAT = 1e-9  # area of a reversed triangle of a fan over its polygon's, below which it is a line
 CONCAVE = "is concave or crosses itself, and its triangles are not in the file; export it as triangles"
 TAKE = "it is truncated, damaged or not what its name says; export it again"
 

@@ -8,7 +8,7 @@ import numpy as np
 
 log = logging.getLogger(__name__)
 
-SAME_PLACE = 1e-8  # of the mesh's size: corners closer than this are one
+SAME_PLACE = 1e-8  # distance over the mesh's size, below which corners are one
 SEEN_FROM = 8  # faces of a body whose middles tell whether it lies inside another
 
 
@@ -48,7 +48,7 @@ def repaired(vertices: np.ndarray, faces: np.ndarray, repair: bool, what: str) -
 
 
 def _weld(vertices: np.ndarray) -> np.ndarray:
-    """For each corner (n,) a number that corners at the same position share."""
+    """Numbers of corners (n,): those at the same position share one."""
     size = float(np.ptp(vertices, axis=0).max()) or 1.0
     cell = np.rint((vertices - vertices.min(axis=0)) / (SAME_PLACE * size)).astype(np.int64)
     return np.unique(cell, axis=0, return_inverse=True)[1].reshape(-1)
@@ -133,7 +133,7 @@ def _wound(faces: np.ndarray, kept: np.ndarray, triangles: np.ndarray) -> np.nda
 
 
 def _outermost(triangles: np.ndarray, body: np.ndarray, bodies: np.ndarray, volume: np.ndarray) -> np.ndarray:
-    """For each of the closed `bodies` (m,) the largest that holds it, or itself; body (k,) of triangles (k, 3, 3)."""
+    """Largest body that holds each of the closed `bodies` (m,), or itself; body (k,) of triangles (k, 3, 3)."""
     order = np.argsort(body, kind="stable")
     begin, end = np.searchsorted(body[order], [bodies, bodies + 1])
     parts = [triangles[order[a:b]] for a, b in zip(begin, end, strict=True)]
@@ -151,7 +151,7 @@ def _outermost(triangles: np.ndarray, body: np.ndarray, bodies: np.ndarray, volu
 
 
 def _turns_about(triangles: np.ndarray, places: np.ndarray) -> float:
-    """How often closed triangles (k, 3, 3) wind about places (n, 3), the mean of |number|.
+    """Winding number of closed triangles (k, 3, 3) about places (n, 3), the mean of |number|.
 
     The sum of their solid angles over 4 pi: of a triangle a, b, c as seen from 0, twice the angle whose tangent is
     a.(b x c) / (|a||b||c| + a.b |c| + b.c |a| + c.a |b|).

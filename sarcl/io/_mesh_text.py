@@ -42,7 +42,8 @@ def of_obj(data: bytes, what: str) -> bytes | None:
         elif word == "f":
             corners = [_corner(corner, counts, f"{what}, line {number + 1}") for corner in rest]
             faces.append((number, corners))
-            lines[number] = _face(corners)
+            words = ("/".join("" if i is None else str(i) for i in corner) for corner in corners)
+            lines[number] = " ".join(["f", *words])
     points = _numbers(vertices)
     if points is not None:
         for number in _wrong_fans([[(corner[0] or 0) - 1 for corner in corners] for _, corners in faces], points):
@@ -72,10 +73,6 @@ def _corner(word: str, counts: dict[str, int], where: str) -> list[int | None]:
             )
         indices.append(absolute)
     return indices
-
-
-def _face(corners: list[list[int | None]]) -> str:
-    return " ".join(["f", *("/".join("" if i is None else str(i) for i in corner) for corner in corners)])
 
 
 def check_off(data: bytes, what: str) -> None:

@@ -30,7 +30,7 @@ def beside(path: Path, name: str) -> Path | None:
 
 
 class Resolver:
-    """What trimesh asks for the files that a mesh names: buffers and materials, from the mesh's own folder.
+    """Files that a mesh names, as trimesh asks for them: buffers and materials, from the mesh's own folder.
 
     external  files elsewhere are read too
     refused   names of files elsewhere that were asked for

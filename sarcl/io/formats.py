@@ -83,7 +83,7 @@ NOT_READ = {  # first bytes of files that are often met, and what to say of them
 
 
 def load(path: Path, make: Make[T], autofocus: bool = False, external: bool = False) -> T:
-    """What make(kind, fields) makes of a file, whose format follows from its first bytes.
+    """The object that make(kind, fields) makes of a file, whose format follows from its first bytes.
 
     external  HDF5 files may lead into other files
     ValueError for a file that is of no known format, truncated or damaged, or a pipe; FileNotFoundError,
@@ -126,7 +126,7 @@ def named(path: PathLike, among: list[Format]) -> Format | None:
 
 
 def ending_of(path: PathLike) -> str:
-    """How the name of a path ends, for messages: that it is a folder, its suffix, or that it has none."""
+    """Words for the end of a path: that it is a folder, its suffix, or that it has none."""
     suffix = Path(path).suffix
     return "is a folder" if Path(path).is_dir() else f"ends in {suffix!r}" if suffix else "has no ending"
 

@@ -52,7 +52,7 @@ def put(group: h5py.Group, name: str, value: object) -> None:
 
 
 def get(group: h5py.Group, name: str) -> Any:
-    """What `put` stored: a str, an int or float, an array, or None."""
+    """Value that `put` stored: a str, an int or float, an array, or None."""
     import h5py
 
     if name in group.attrs:
@@ -66,7 +66,7 @@ def get(group: h5py.Group, name: str) -> Any:
 
 
 def get_all(group: h5py.Group, leave: Sequence[str] = ()) -> dict[str, Any]:
-    """What `put` stored in a group, by name, except the names to leave; a group in it becomes a mapping."""
+    """Values that `put` stored in a group, by name, except the names to leave; a group in it becomes a mapping."""
     import h5py
 
     names = [name for name in (*group.attrs, *group) if name not in leave]

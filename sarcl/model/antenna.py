@@ -17,11 +17,11 @@ Kind = Literal["isotropic", "aperture", "gaussian", "table"]
 TABLE = ("azimuth", "elevation", "values")  # fields of the kind "table"
 KINDS = ("isotropic", "aperture", "gaussian", "table")
 LEVEL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))  # mount of an antenna along the body's axes
-MOST_DECIBELS = 300.0  # of gains: the squares of both antennas' amplitudes stay within float32
+MOST_DECIBELS = 300.0  # largest gain, dB: the squares of both antennas' amplitudes stay within float32
 HEADER = 16  # floats before the coefficients of a table, as kernels/pattern.clh reads them
-ANGLE_ERROR = 5e-7  # rad, of float32 directions in antenna axes
-COSINE = 1e-5  # added to limits of direction cosines, which kernels compute in float32
-FLOAT_ERROR = 2e-6  # of the peak: rounding of float32 sines, exponentials and spline sums
+ANGLE_ERROR = 5e-7  # error of float32 directions in antenna axes, rad
+COSINE = 1e-5  # margin of limits of direction cosines, which kernels compute in float32
+FLOAT_ERROR = 2e-6  # error of gains over the peak: rounding of float32 sines, exponentials and spline sums
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

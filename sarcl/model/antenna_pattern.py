@@ -12,7 +12,7 @@ from ..base.vectors import unit
 if TYPE_CHECKING:
     from .antenna import Antenna
 
-SLACK = 1e-3  # of a table's step: directions outside the table by no more get the value at its edge
+SLACK = 1e-3  # distance to a table, in its steps, within which directions get the value at its edge
 
 
 def uniform_spline(values: np.ndarray) -> np.ndarray:
@@ -118,12 +118,10 @@ def splines(antenna: Antenna) -> tuple[Any, Any]:
     """Bicubic (not-a-knot) splines of a table's real and imaginary parts over azimuth and elevation."""
     from scipy.interpolate import RectBivariateSpline
 
-    real, imag = (RectBivariateSpline(antenna.azimuth, antenna.elevation, v) for v in _parts(antenna.values))
+    real, imag = (
+        RectBivariateSpline(antenna.azimuth, antenna.elevation, v) for v in (antenna.values.real, antenna.values.imag)
+    )
     return real, imag
-
-
-def _parts(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    return values.real, values.imag
 
 
 def two_way_gain(

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 Date = str | datetime.date | np.datetime64  # a datetime.datetime is a datetime.date
 
 
-YEARS = 1678, 2261  # that nanoseconds in 64 bits reach
+YEARS = 1678, 2261  # first and last year that nanoseconds in 64 bits reach
 WANTED = "wanted UTC such as '2021-12-23T05:10:21.029300', a datetime or numpy's datetime64"
 
 

@@ -25,7 +25,7 @@ from .trajectory import BYTES_PER_PULSE, Trajectory
 if TYPE_CHECKING:
     from ..base.types import PathLike
 
-LINES_DAYS = 1.0  # about the epoch of two-line elements; their error grows by kilometres per day
+LINES_DAYS = 1.0  # days before and after the epoch of two-line elements, whose error grows by kilometres per day
 ROUNDING = 1e-9  # s: a time outside the span by less counts as its end
 DIFFERENCE = 0.5  # s: of velocities to accelerations, accurate to 1e-6 m/s^2
 
@@ -138,7 +138,7 @@ class Orbit:
             raise ValueError(f"orbit file {path.name!r}: {exc}") from None
 
     def describe(self) -> str:
-        """How positions are computed, with the order of the interpolation and its measured error, and from when on."""
+        """Words for the computation of positions: order and measured error of the interpolation, and the span of time."""
         start, stop = self.span
         since = "an unknown epoch" if self.epoch is None else f"{self.epoch} UTC"
         return f"{self.path.describe()}; from {start:.9g} to {stop:.9g} s after {since}"
@@ -264,7 +264,7 @@ class Orbit:
         return x.reshape(*times.shape, 3)
 
     def view(self, t: ArrayLike, positions: ArrayLike) -> viewing.View:
-        """How the satellite at times, s (...), sees Earth-fixed positions, m (..., 3): angles, ranges, Doppler."""
+        """View of Earth-fixed positions, m (..., 3), from the satellite at times, s (...): angles, ranges, Doppler."""
         x = places(positions)
         times, _ = together(t=self._times(t), positions=x[..., 0])
         p, v = self._states(times)

@@ -11,8 +11,8 @@ from ..base import constants, validation
 from .phase_history import PhaseHistory
 from .waveform import Waveform
 
-MOST_DECIBELS = 300.0  # of losses: amplitudes stay within float32
-BOLTZMANN = 1.380649e-23  # J/K, exact
+MOST_DECIBELS = 300.0  # largest losses, dB: amplitudes stay within float32
+BOLTZMANN = 1.380649e-23  # Boltzmann's constant, J/K, exact
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,7 +13,7 @@ from ..base import validation
 from . import triangles as geometry
 
 SECTIONS = 72  # default number of facets around an axis
-MOST_FACETS = 50_000_000  # of a shape
+MOST_FACETS = 50_000_000  # largest number of facets of a shape
 
 
 def revolved(profile: Sequence[tuple[float, float]], edge: float | None, sections: int | None) -> np.ndarray:

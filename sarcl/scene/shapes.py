@@ -140,7 +140,7 @@ def sphere(
     if edge is not None and facets is not None:
         raise ValueError("sphere takes edge or facets, not both: one follows from the other")
     if edge is None:
-        n = _cuts(validation.count("facets", 2000 if facets is None else facets))
+        n = int(np.ceil(np.sqrt(validation.count("facets", 2000 if facets is None else facets) / 20)))
         return _placed(radius * _solids.geodesic(n), None, **options)
     edge = validation.number("edge", edge, above=0)
     # from the icosahedron's edge; facets in the middle of its faces are larger
@@ -166,10 +166,6 @@ def tank(
     stretch = np.array(_dimensions("size", size, 3)) / _tank.SIZE
     finest = None if edge is None else validation.number("edge", edge, above=0) / float(stretch.max())
     return _placed(_tank.triangles(finest, sections) * stretch, edge, **options)
-
-
-def _cuts(facets: int) -> int:
-    return int(np.ceil(np.sqrt(facets / 20)))
 
 
 def _revolved(

@@ -16,7 +16,7 @@ from .material import FacetMaterials, MaterialLike, resolve
 log = logging.getLogger(__name__)
 
 Heights = tuple[np.ndarray, np.ndarray, np.ndarray]  # x (n_x,), y (n_y,), both increasing, and z (n_y, n_x), m
-ON = 1e-9  # ratio to a terrain's size, of a distance from it: corners no farther away lie on it
+ON = 1e-9  # distance to a terrain over its size, within which corners lie on it
 
 
 def grid(x: ArrayLike, y: ArrayLike, z: ArrayLike | Callable[[np.ndarray, np.ndarray], ArrayLike]) -> np.ndarray:
@@ -165,7 +165,7 @@ def facets_on(grid: Heights, triangles: np.ndarray) -> np.ndarray | None:
         near = np.clip(corners[:, axis], ends[0], ends[-1])
         corners[:, axis] = np.where(np.abs(near - corners[:, axis]) <= ON * size, near, corners[:, axis])
     is_on = np.asarray((np.abs(above(grid, corners)) <= ON * size).reshape(-1, 3).all(axis=1))
-    area = geometry.areas(geometry.of_grid(_points(grid))).sum()
+    area = geometry.areas(geometry.of_grid(np.stack([*np.meshgrid(x, y), z], axis=-1))).sum()
     return is_on if abs(geometry.areas(triangles[is_on]).sum() - area) <= 1e-6 * area else None
 
 
@@ -180,7 +180,3 @@ def raised(grid: Heights, before: np.ndarray, after: np.ndarray) -> Heights | No
     heights = z.copy()
     heights[row[is_grid_point], column[is_grid_point]] = after[is_grid_point, 2]
     return x, y, validation.sealed(heights)
-
-
-def _points(grid: Heights) -> np.ndarray:
-    return np.stack([*np.meshgrid(*grid[:2]), grid[2]], axis=-1)
