@@ -155,11 +155,11 @@ def measure(image: Image, near: ArrayLike | None = None) -> PointResponse | tupl
     validation.instance("image", image, Image)
     _check(image)
     if near is None:
-        return _measured(image, *brightest(image))
+        return _measure_peak(image, *brightest(image))
     if validation.ndim("near", near) != 2:
-        return _measured(image, *peak_near(image, near))
+        return _measure_peak(image, *peak_near(image, near))
     places = validation.array("near", near, np.float64, ("n", 3))
-    return tuple(_measured(image, *peak_near(image, position)) for position in places)
+    return tuple(_measure_peak(image, *peak_near(image, position)) for position in places)
 
 
 class _Outshone(Exception):
@@ -169,7 +169,7 @@ class _Outshone(Exception):
         self.position, self.axis, self.name, self.cut = position, axis, name, cut
 
 
-def _measured(image: Image, row: int, column: int) -> PointResponse:
+def _measure_peak(image: Image, row: int, column: int) -> PointResponse:
     """The response of the peak at a pixel; ValueError names the strongest pixel in whose response it lies."""
     try:
         return _response(image, row, column)

@@ -63,7 +63,7 @@ class StateVectors:
         for hermite, counts in ((True, HERMITE), (False, LAGRANGE)):
             for n in counts:
                 if n < len(times):
-                    misfit = _left_out(times, positions, velocities, n, hermite)
+                    misfit = _leave_one_out(times, positions, velocities, n, hermite)
                     candidates.append((float(misfit.max()), n, hermite, int(misfit.argmax()) + 1))
         least = min(t[0] for t in candidates)
         error, n, hermite, worst = next(t for t in candidates if t[0] <= max(ORDER_MARGIN * least, FINE))
@@ -132,7 +132,7 @@ def _sum(weights: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[n
     return np.asarray(np.einsum("nm,nmk->nk", weights, values))
 
 
-def _left_out(
+def _leave_one_out(
     times: NDArray[np.float64], positions: NDArray[np.float64], velocities: NDArray[np.float64], n: int, hermite: bool
 ) -> NDArray[np.float64]:
     """Distances, m, of all states but the first and the last from their interpolation by n neighbours."""

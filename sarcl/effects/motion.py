@@ -54,7 +54,7 @@ def perturbed(
     with np.errstate(over="ignore", invalid="ignore"):  # positions that are not finite are refused by their name
         hertz = frequencies(correlation_time, spectrum, seed)
         offset, rate = random_process(track.known_times, deviation("rms", rms), hertz, seed, 0)
-        moved = _moved(track, offset, rate, frame)
+        moved = _move(track, offset, rate, frame)
         angles = deviation("attitude_rms", attitude_rms)
         return turned(moved, random_process(track.known_times, angles, hertz, seed, 1)[0]) if angles.any() else moved
 
@@ -79,7 +79,7 @@ def sinusoidal(
     phase = validation.array("phase", phase, np.float64, (3,))
     with np.errstate(over="ignore", invalid="ignore"):  # positions that are not finite are refused by their name
         angle = rate * track.known_times[:, None] + phase
-        return _moved(track, size * np.sin(angle), size * rate * np.cos(angle), frame)
+        return _move(track, size * np.sin(angle), size * rate * np.cos(angle), frame)
 
 
 def with_positions(raw: PhaseHistory, track: Trajectory, *, receiver: Trajectory | None = None) -> PhaseHistory:
@@ -170,7 +170,7 @@ def combined(parts: Sequence[PhaseHistory]) -> PhaseHistory:
     first = parts[0]
     total = np.zeros(first.samples.shape, np.result_type(*(p.samples.dtype for p in parts)))
     for i, part in enumerate(parts):
-        _same_rows(first, part, i)
+        _check_same_rows(first, part, i)
         shift = (
             2
             / np.longdouble(constants.SPEED_OF_LIGHT)
@@ -180,14 +180,14 @@ def combined(parts: Sequence[PhaseHistory]) -> PhaseHistory:
             rows = slice(start, min(start + 256, first.n_rows))
             block = part.read(rows.start, rows.stop)
             if shift.any():
-                _stays(block, np.asarray(shift[rows] * part.frequency_step[rows], np.float64), i, start)
+                _check_window(block, np.asarray(shift[rows] * part.frequency_step[rows], np.float64), i, start)
                 f = part.frequency[rows, None] + part.frequency_step[rows, None] * np.arange(part.n_samples)
                 block = block * np.exp(-2j * np.pi * ((f * shift[rows, None]) % 1).astype(np.float64))
             total[rows] += block
     return replace(first, samples=validation.sealed(total), report=None)
 
 
-def _same_rows(first: PhaseHistory, part: PhaseHistory, i: int) -> None:
+def _check_same_rows(first: PhaseHistory, part: PhaseHistory, i: int) -> None:
     if part.samples.shape != first.samples.shape:
         raise ValueError(
             f"part {i} has samples {part.samples.shape}, part 0 {first.samples.shape}; make both with the same track "
@@ -199,7 +199,7 @@ def _same_rows(first: PhaseHistory, part: PhaseHistory, i: int) -> None:
             raise ValueError(f"part {i} and part 0 differ in {name}; make both with the same waveform and range_window")
 
 
-def _stays(block: np.ndarray, shift: np.ndarray, i: int, start: int) -> None:
+def _check_window(block: np.ndarray, shift: np.ndarray, i: int, start: int) -> None:
     """Raise ValueError where echoes of a row, shifted by `shift` periods, would wrap to the window's other end."""
     n = block.shape[1]
     power = np.abs(np.fft.ifft(block, axis=1)) ** 2
@@ -231,7 +231,7 @@ def _pulse_of_row(raw: PhaseHistory, track: Trajectory) -> np.ndarray:
     return row
 
 
-def _moved(track: Trajectory, offset: np.ndarray, rate: np.ndarray, frame: str) -> Trajectory:
+def _move(track: Trajectory, offset: np.ndarray, rate: np.ndarray, frame: str) -> Trajectory:
     """The track moved by offsets, m (n, 3), along the axes of the frame; rate  of the offsets, m/s (n, 3)."""
     if validation.choice("frame", frame, FRAMES) == "track":
         along = velocities(track)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 AGAIN = "export it again"
 
 
-def opened(data: bytes) -> collada.Collada:
+def open_document(data: bytes) -> collada.Collada:
     """The file as pycollada reads it, with the list of what it could not read; its exceptions for what is no file."""
     import collada
 
@@ -31,7 +31,7 @@ def check_kind(data: bytes, what: str) -> None:
 
 
 def check(document: collada.Collada, what: str) -> None:
-    """ValueError for surfaces that are missing or covered wrongly; document  of `opened`."""
+    """ValueError for surfaces that are missing or covered wrongly; document  of `open_document`."""
     tag, root = document.tag, document.xmlnode.getroot()
     if next(root.iter(tag("instance_controller")), None) is not None:
         raise ValueError(

@@ -29,13 +29,13 @@ def check(data: bytes) -> None:
     order: Order = "little" if data[126:128] == b"IM" else "big"
     for kind, body in _elements(memoryview(data)[128:], order):
         if kind == COMPRESSED:
-            for part_kind, part in _elements(memoryview(_unpacked(body)), order):
+            for part_kind, part in _elements(memoryview(_decompress(body)), order):
                 _check_array(part_kind, part, order)
         else:
             _check_array(kind, body, order)
 
 
-def _unpacked(body: memoryview) -> bytes:
+def _decompress(body: memoryview) -> bytes:
     stream = zlib.decompressobj()
     try:
         unpacked = stream.decompress(body)

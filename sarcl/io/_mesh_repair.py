@@ -24,18 +24,18 @@ def repaired(vertices: np.ndarray, faces: np.ndarray, repair: bool, what: str) -
     # bodies that touch are closed before their corners are merged, and may not be closed afterwards
     for corners in (faces, place):
         if repair:
-            turned = _wound(corners, kept, vertices[faces])
+            turned = _faces_to_reverse(corners, kept, vertices[faces])
             # closed bodies may share a wall with two faces; elsewhere faces that differ in winding alone are one face
-            alike = _closed(_turn(corners, turned)[kept])
-            first = _first(_turn(place, turned), kept, alike)
+            alike = _is_closed(_turn(corners, turned)[kept])
+            first = _without_repeats(_turn(place, turned), kept, alike)
             repeated += int(kept.sum() - first.sum())
             kept = first
             if not alike:  # repeated faces have hidden which faces are neighbours
-                turned = _wound(corners, kept, vertices[faces])
-        closed = _closed(_turn(corners, turned)[kept])
+                turned = _faces_to_reverse(corners, kept, vertices[faces])
+        closed = _is_closed(_turn(corners, turned)[kept])
         if closed:
             break
-    if not closed and repair and not _oriented(place, turned, kept):
+    if not closed and repair and not _is_oriented(place, turned, kept):
         log.info("%s has faces that no winding could make agree with their neighbours", what)
     for n, why in (
         (collapsed, "left out: two of their corners are one"),
@@ -58,7 +58,7 @@ def _turn(faces: np.ndarray, turned: np.ndarray) -> np.ndarray:
     return np.where(turned[:, None], faces[:, ::-1], faces)
 
 
-def _first(faces: np.ndarray, kept: np.ndarray, alike: bool) -> np.ndarray:
+def _without_repeats(faces: np.ndarray, kept: np.ndarray, alike: bool) -> np.ndarray:
     """`kept` without faces that repeat an earlier one: the same corners, and if `alike` the same winding."""
     start = faces.argmin(axis=1)[:, None]
     key = np.take_along_axis(faces, (start + np.arange(3)) % 3, axis=1) if alike else np.sort(faces, axis=1)
@@ -77,7 +77,7 @@ def _edges(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return number, forward, np.repeat(np.arange(len(faces)), 3)
 
 
-def _closed(faces: np.ndarray) -> bool:
+def _is_closed(faces: np.ndarray) -> bool:
     """True where every edge belongs to two faces that pass it in opposite directions."""
     number, forward, _ = _edges(faces)
     return bool(
@@ -85,14 +85,14 @@ def _closed(faces: np.ndarray) -> bool:
     )
 
 
-def _oriented(faces: np.ndarray, turned: np.ndarray, kept: np.ndarray) -> bool:
+def _is_oriented(faces: np.ndarray, turned: np.ndarray, kept: np.ndarray) -> bool:
     """True where no two faces that alone share an edge pass it in the same direction."""
     number, forward, _ = _edges(_turn(faces, turned)[kept])
     pair = np.bincount(number) == 2
     return bool((np.bincount(number, weights=forward * 2 - 1.0)[pair] == 0).all())
 
 
-def _wound(faces: np.ndarray, kept: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+def _faces_to_reverse(faces: np.ndarray, kept: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Faces to reverse, of those kept, so that neighbours have one winding and closed bodies face outwards.
 
     A closed body inside another is turned round only with it: wound inwards, it is the wall of a cavity.

@@ -41,7 +41,7 @@ class Part:
                 self._lock: int | None = os.open(self.path, flags, 0o666)
             except FileExistsError:
                 continue
-            if _locked(self._lock) is not False and _is(self._lock, self.path):
+            if _try_lock(self._lock) is not False and _is_file_at(self._lock, self.path):
                 return
             os.close(self._lock)  # another process took it for a leftover before it was locked
 
@@ -79,7 +79,7 @@ class Part:
 
     def restore(self) -> None:
         """Write anew what this file, still open here, holds, where its folder or its name was deleted meanwhile."""
-        if self._lock is None or _is(self._lock, self.path):
+        if self._lock is None or _is_file_at(self._lock, self.path):
             return
         self.target.parent.mkdir(parents=True, exist_ok=True)
         log.warning("%s was deleted while %s was written in it; it is made again", self.target.parent, self.target.name)
@@ -118,7 +118,7 @@ def _tag(target: Path) -> str:
     return f"{zlib.crc32(os.fsencode(target.name)):08x}"
 
 
-def _locked(descriptor: int) -> bool | None:
+def _try_lock(descriptor: int) -> bool | None:
     """True where the file is locked now, without waiting; False where another has it; None without locks here."""
     try:
         import fcntl
@@ -133,7 +133,7 @@ def _locked(descriptor: int) -> bool | None:
     return True
 
 
-def _is(descriptor: int, path: Path) -> bool:
+def _is_file_at(descriptor: int, path: Path) -> bool:
     """Whether `path` still names the open file."""
     try:
         return os.path.samestat(os.fstat(descriptor), os.lstat(path))
@@ -155,11 +155,11 @@ def _clean(target: Path, own: Path) -> bool:
         try:
             status = os.fstat(descriptor)
             mine = stat.S_ISREG(status.st_mode) and (not hasattr(os, "getuid") or status.st_uid == os.getuid())
-            free = _locked(descriptor)
+            free = _try_lock(descriptor)
             if free is False:
                 others |= match["target"] == _tag(target)
             elif free and mine and (match["host"] == _host() or time.time() - status.st_mtime > OLD):
-                if _is(descriptor, path):
+                if _is_file_at(descriptor, path):
                     path.unlink()
                     log.info("removed %s, which a killed run left", path)
         except OSError as exc:

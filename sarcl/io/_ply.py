@@ -244,7 +244,9 @@ def _vertices(element: _Element, body: _Text | _Binary, what: str) -> np.ndarray
         raise ValueError(
             f"{what} has vertices of {', '.join(types) or 'nothing'}, wanted x, y and z: {_mesh_checks.TAKE}"
         )
-    coordinates = [_whole(body.take(element.start[name], types[name]), types[name], name, what) for name in "xyz"]
+    coordinates = [
+        _whole_numbers(body.take(element.start[name], types[name]), types[name], name, what) for name in "xyz"
+    ]
     return np.stack(coordinates, axis=1).astype(np.float64)
 
 
@@ -267,14 +269,14 @@ def _triangles(element: _Element, body: _Text | _Binary, vertices: np.ndarray, w
         raise ValueError(
             f"{what}: face {owner[face]} names vertex {index[face]:.20g} of {len(vertices)}: {_mesh_checks.TAKE}"
         )
-    index = _whole(index, p.type, p.name, what).astype(np.int64)
+    index = _whole_numbers(index, p.type, p.name, what).astype(np.int64)
     wrong_faces = _mesh_checks.wrong_fans(corners, index, vertices)
     if wrong_faces:
         raise ValueError(f"{what}: face {wrong_faces[0]}, of {corners[wrong_faces[0]]} corners, {_mesh_checks.CONCAVE}")
     return _mesh_checks.fans(corners, index)
 
 
-def _whole(given: np.ndarray, type_: np.dtype, name: str, what: str) -> np.ndarray:
+def _whole_numbers(given: np.ndarray, type_: np.dtype, name: str, what: str) -> np.ndarray:
     """`given`; ValueError for numbers of text that do not fit the whole-number type that is declared for them."""
     if type_.kind == "f" and name in "xyz":
         return given

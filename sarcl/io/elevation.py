@@ -53,7 +53,7 @@ def load(
     path = arguments.path("path", path)
     name = f"DEM {path.name!r}"
     external = validation.flag("external", external)
-    with _opened(path, name, external) as file:
+    with _open_raster(path, name, external) as file:
         _check_place(file, name)
         above = _reference(file, name, heights, geoid)
         rows, columns = _window(file, name, bounds)
@@ -106,7 +106,7 @@ def local_frame(tile: Tile, center: ArrayLike | None) -> tuple[np.ndarray, np.nd
 
 
 @contextmanager
-def _opened(path: Path, name: str, external: bool) -> Iterator[DatasetReader]:
+def _open_raster(path: Path, name: str, external: bool) -> Iterator[DatasetReader]:
     """A raster, open for reading."""
     is_file = not path.is_dir()  # some formats are folders
     if is_file:
@@ -191,7 +191,7 @@ def _window(file: DatasetReader, name: str, bounds: ArrayLike | None) -> tuple[n
             )
         from rasterio.warp import transform_bounds
 
-        left, bottom, right, top = transform_bounds(WGS84, file.crs, *bounds) if _warped(file) else bounds
+        left, bottom, right, top = transform_bounds(WGS84, file.crs, *bounds) if _is_warped(file) else bounds
         t = ~file.transform
         corners = [(t.d * x + t.e * y + t.f, t.a * x + t.b * y + t.c) for x in (left, right) for y in (bottom, top)]
         indices = np.array(corners) - 0.5  # points are centres of pixels
@@ -247,7 +247,7 @@ def _places(file: DatasetReader, name: str, rows: np.ndarray, columns: np.ndarra
     t = file.transform
     x, y = t.a * column + t.b * row + t.c, t.d * column + t.e * row + t.f
     longitude, latitude, off = x, y, np.zeros((2, 4))
-    if _warped(file):
+    if _is_warped(file):
         from rasterio.warp import transform
 
         longitude, latitude = (np.reshape(a, x.shape) for a in transform(file.crs, WGS84, x.ravel(), y.ravel()))
@@ -264,7 +264,7 @@ def _places(file: DatasetReader, name: str, rows: np.ndarray, columns: np.ndarra
     return longitude, latitude
 
 
-def _warped(file: DatasetReader) -> bool:
+def _is_warped(file: DatasetReader) -> bool:
     """True where coordinates are not degrees on WGS84 already."""
     wkt = file.crs.to_wkt()
     degrees = re.search(r'GEOGCS\[.*?UNIT\["degree"', wkt) is not None
@@ -293,9 +293,9 @@ def undulation(
 def _raster(path: Path, longitude: np.ndarray, latitude: np.ndarray, external: bool) -> np.ndarray:
     """A raster of undulations, in degrees, read bilinearly at points."""
     name = f"geoid {path.name!r}"
-    with _opened(path, name, external) as file:
+    with _open_raster(path, name, external) as file:
         _check_place(file, name)
-        if _warped(file):
+        if _is_warped(file):
             raise ValueError(f"{name} is not in degrees on WGS84; convert it (gdalwarp -t_srs EPSG:4326)")
         t = ~file.transform
         around = abs(file.width * file.transform.a - 360) < 1e-6  # columns cover all longitudes

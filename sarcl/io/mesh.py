@@ -135,7 +135,7 @@ def _scene(
     elif kind == ".dae":
         _collada_checks.check_kind(data, what)
     try:
-        collada = _collada_checks.opened(data) if kind == ".dae" else None
+        collada = _collada_checks.open_document(data) if kind == ".dae" else None
         # process=False: merging and reordering corners is not needed and hides what the file holds
         scene = trimesh.load_scene(
             io.BytesIO(data),

@@ -43,8 +43,8 @@ def load(path: PathLike, make: Make[T], autofocus: bool = False, external: bool 
     other files.
     """
     name = str(path)
-    sums = _checked(path)
-    file = _opened(path)
+    sums = _verify_checksums(path)
+    file = _open_file(path)
     try:
         try:
             mark, version = file.attrs.get("sarcl_file"), file.attrs.get("format")
@@ -80,8 +80,8 @@ def open_rows(path: PathLike, name: str) -> h5py.Dataset:
 
     ValueError where the file is damaged, OSError or KeyError where there is no such file or dataset.
     """
-    sums = _checked(path)
-    dataset = _opened(path)[name]
+    sums = _verify_checksums(path)
+    dataset = _open_file(path)[name]
     return (
         dataset
         if sums is None or sums.rows is None or sums.rows[0] != name.strip("/")
@@ -89,7 +89,7 @@ def open_rows(path: PathLike, name: str) -> h5py.Dataset:
     )
 
 
-def _checked(path: PathLike) -> _checksums.Checksums | None:
+def _verify_checksums(path: PathLike) -> _checksums.Checksums | None:
     """Checksums of a file after a check of all but its rows; one without checksums is tried in another process."""
     try:
         sums = _checksums.of(Path(path))
@@ -102,7 +102,7 @@ def _checked(path: PathLike) -> _checksums.Checksums | None:
     return sums
 
 
-def _opened(path: PathLike) -> h5py.File:
+def _open_file(path: PathLike) -> h5py.File:
     import h5py
 
     try:
@@ -121,8 +121,8 @@ def _with_checksums(dataset: h5py.Dataset, sums: _checksums.Checksums) -> h5py.D
 def job_of(path: PathLike) -> str | None:
     """The mark of the job that made an image file; None where there is no such file, or no mark in a whole file."""
     try:
-        _checked(path)
-        with _opened(path) as file:
+        _verify_checksums(path)
+        with _open_file(path) as file:
             job = file.attrs.get("job")
             return job if isinstance(job, str) else None
     except (OSError, KeyError, RuntimeError, ValueError):

@@ -320,7 +320,7 @@ def _of_pulses(signal: _Signal, delay: np.ndarray, bandwidth: float, factor: com
 
     def spectra(block: np.ndarray, rows: slice) -> np.ndarray:
         if signal.is_rf:
-            block = _mixed(block, rate, signal.start[rows], carrier[rows])
+            block = _mix_down(block, rate, signal.start[rows], carrier[rows])
         bins = np.fft.fft(block * shift, length, axis=1)[:, :n_bins]
         cycles = carrier_cycles[rows, None] - step * (lowest + np.arange(n_bins)) * offset[rows, None]
         return np.asarray(factor * bins * np.exp(2j * np.pi * cycles))
@@ -394,7 +394,7 @@ def _check_beat(samples: np.ndarray, beat: str, zero: float) -> None:
         )
 
 
-def _mixed(block: np.ndarray, rate: float, start: np.ndarray, carrier: np.ndarray) -> np.ndarray:
+def _mix_down(block: np.ndarray, rate: float, start: np.ndarray, carrier: np.ndarray) -> np.ndarray:
     """The analytic signal of real rows (n_rows, n), its carrier, Hz (n_rows,), mixed to 0.
 
     start  s (n_rows,), of sample 0 after the transmission

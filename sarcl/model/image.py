@@ -208,7 +208,7 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
         gain = self.gain
         if isinstance(gain, np.ndarray):
             gain = np.sqrt(mean(gain[: rows * a, : columns * b] ** 2))
-        return replace(self, data=mean(power), grid=_looked(self.grid, a, b), gain=gain)
+        return replace(self, data=mean(power), grid=_multilooked_grid(self.grid, a, b), gain=gain)
 
     def show(
         self,
@@ -326,7 +326,7 @@ def _checked_gain(gain: object, grid: ImageGrid) -> float | NDArray[np.floating]
     return gains
 
 
-def _looked(grid: ImageGrid, a: int, b: int) -> ImageGrid:
+def _multilooked_grid(grid: ImageGrid, a: int, b: int) -> ImageGrid:
     """The grid of means over blocks of (a, b) pixels: the mean of a block lies at the mean position of its pixels."""
     rows, columns = grid.shape[0] // a, grid.shape[1] // b
     if grid.spacing is not None:

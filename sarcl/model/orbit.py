@@ -138,7 +138,7 @@ class Orbit:
             raise ValueError(f"orbit file {path.name!r}: {exc}") from None
 
     def describe(self) -> str:
-        """Words for the computation of positions: order and measured error of the interpolation, and the span of time."""
+        """Words for the computation of positions: order and measured error of the interpolation, span of time."""
         start, stop = self.span
         since = "an unknown epoch" if self.epoch is None else f"{self.epoch} UTC"
         return f"{self.path.describe()}; from {start:.9g} to {stop:.9g} s after {since}"

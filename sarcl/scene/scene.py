@@ -85,7 +85,7 @@ class Scene:
         if self.material is None:
             object.__setattr__(self, "material", np.broadcast_to(np.int32(0), (k,)))
         if self.point_roughness is None:
-            object.__setattr__(self, "point_roughness", _none(k))
+            object.__setattr__(self, "point_roughness", _no_displacements(k))
         shapes = {"positions": (n, 3), "triangles": (k, 3, 3), "amplitudes": (n,), "point_roughness": (k, 3, 3)}
         dtypes = {"amplitudes": np.complex128, "two_sided": np.bool_, "material": np.int32}
         for name in _ARRAYS:
@@ -152,7 +152,7 @@ class Scene:
             "roughness": terrain.spread("roughness", roughness, (k,)),
             "two_sided": terrain.spread("two_sided", two_sided, (k,), np.bool_),
             "material": index,
-            "point_roughness": _none(k),
+            "point_roughness": _no_displacements(k),
         }
         if point_roughness is not None:
             parts["point_roughness"] = validation.array("point_roughness", point_roughness, np.float64, (k, 3, 3))
@@ -395,7 +395,7 @@ class Scene:
         random = gaussian(self.triangles.reshape(-1, 3), seed, POINT_HEIGHTS).reshape(-1, 3, 1)
         moved = validation.sealed(self.triangles + random * self.point_roughness)
         heights = None if self.heights is None else terrain.raised(self.heights, self.triangles, moved)
-        return replace(self, triangles=moved, point_roughness=_none(len(moved)), heights=heights)
+        return replace(self, triangles=moved, point_roughness=_no_displacements(len(moved)), heights=heights)
 
     def part(self, which: np.ndarray) -> Scene:
         """The scene with only those of its facets for which `which`, bool (k,), is True."""
@@ -421,13 +421,15 @@ class Scene:
         belongs: dict[str, Any] = {
             n: validation.sealed(getattr(self, n)[row]) for n in ("reflectivity", "roughness", "two_sided", "material")
         }
-        return replace(self, triangles=validation.sealed(triangles), point_roughness=_none(len(row)), **belongs)
+        return replace(
+            self, triangles=validation.sealed(triangles), point_roughness=_no_displacements(len(row)), **belongs
+        )
 
 
 _ARRAYS = tuple(n for n in Scene.__dataclass_fields__ if n not in ("materials", "heights"))
 _FACET_ARRAYS = tuple(n for n in _ARRAYS if n not in ("positions", "amplitudes"))
 
 
-def _none(k: int) -> np.ndarray:
+def _no_displacements(k: int) -> np.ndarray:
     """Zero displacements for k facets, which occupy no memory."""
     return np.broadcast_to(0.0, (k, 3, 3))
