@@ -24,7 +24,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING, Literal, cast
+from typing import TYPE_CHECKING, Literal, NamedTuple, cast
 
 import numpy as np
 
@@ -66,13 +66,12 @@ class TimeRecord:
     scene_range: ArrayLike | None
 
 
-@dataclass(frozen=True, eq=False)
-class Spectra:
-    """samples (n_rows, n); frequency of sample 0, Hz (n_rows,); step, Hz; reference_range, m (n_rows,)."""
+class Spectra(NamedTuple):
+    """Fields of a PhaseHistory: samples (n_rows, n); frequency, Hz (n_rows,); its step, Hz; reference, m (n_rows,)."""
 
     samples: np.ndarray
     frequency: np.ndarray
-    step: float
+    frequency_step: float
     reference_range: np.ndarray
 
 

@@ -298,18 +298,11 @@ class PhaseHistory:
         places: dict[str, Any] = {"tx": tx, "rx": rx, **rows}
         if track is not None:
             places = rows_of_track(track, rx, spectra.reference_range, rows)
-        out = cls(
-            spectra.samples,
-            spectra.frequency,
-            spectra.step,
-            reference_range=spectra.reference_range,
-            waveform=waveform,
-            compressed=kind != "chirped" and not (kind == "rf" and waveform is not None),
-            **places,
-        )
+        compressed = kind != "chirped" and not (kind == "rf" and waveform is not None)
+        raw = cls(**spectra._asdict(), waveform=waveform, compressed=compressed, **places)
         if track is None:
-            check_orbit(out)
-        return out
+            check_orbit(raw)
+        return raw
 
     def __repr__(self) -> str:
         low = self.frequency.min() / 1e9
