@@ -23,7 +23,7 @@ from ._view import Ends, ends_at
 CHIP = 32  # pixels on each side of the point from whose spectrum the occupied band is determined
 LEAST = 8  # pixels on each side that a spectrum needs at least
 BAND = 0.42  # cycles per pixel, largest occupied band: the kernel's transition takes the rest of 0.5
-FALL = 1e-3  # of the largest spectral density: the band ends where the density stays below it
+FALL = 1e-3  # spectral density over its largest value, below which the band ends
 SHRINK = 0.9  # factor by which a cut is shortened whose ends lie too near to the border of a grid of terrain
 KAISER = 8.96, 5.715  # shape, and pixels times transition width, for 90 dB by Kaiser's formulas
 
@@ -124,22 +124,22 @@ class ImageInterpolator:
 
     def room(self, position: np.ndarray, axis: np.ndarray) -> float:
         """Largest distance, m, along +axis and -axis at which all pixels exist; 0 or less if some are missing here."""
-        here = self.surface.index(position)
-        slope = np.abs(self.surface.index(position + axis) - here)
-        ahead = np.array(self.image.grid.shape) - 1 - self.taps // 2 - here
-        behind = here - (self.taps // 2 - 1)
+        index = self.surface.index(position)
+        slope = np.abs(self.surface.index(position + axis) - index)
+        ahead = np.array(self.image.grid.shape) - 1 - self.taps // 2 - index
+        behind = index - (self.taps // 2 - 1)
         with np.errstate(divide="ignore"):
-            made = float(((np.minimum(ahead, behind) - 1e-6) / slope).min())
+            distance = float(((np.minimum(ahead, behind) - 1e-6) / slope).min())
         if (
             self.image.grid.times is not None
         ):  # rows and columns of terrain are not evenly spaced: the ends must fit too
             low, high = self.taps // 2 - 1, np.array(self.image.grid.shape) - 1 - self.taps // 2
-            while made > 0:
-                ends = self.surface.index(position + made * np.array([[-1.0], [1.0]]) * axis)
+            while distance > 0:
+                ends = self.surface.index(position + distance * np.array([[-1.0], [1.0]]) * axis)
                 if (ends >= low).all() and (ends <= high).all():
                     break
-                made *= SHRINK
-        return made
+                distance *= SHRINK
+        return distance
 
 
 def _kernel(distance: np.ndarray, taps: int) -> np.ndarray:
@@ -151,14 +151,14 @@ def _bands(about: ImageInterpolator) -> tuple[list[float], tuple[float, float]]:
     """Largest frequencies, cycles per pixel, of the response at a pixel, along rows and along columns; and the middle
     of its band, where the response fits between its aliases about that, but not about the carrier."""
     row, column = about.pixel
-    at, shape = np.array(about.pixel), np.array(about.image.grid.shape)
-    half = np.minimum(CHIP, np.minimum(at, shape - 1 - at))
+    pixel, shape = np.array(about.pixel), np.array(about.image.grid.shape)
+    half = np.minimum(CHIP, np.minimum(pixel, shape - 1 - pixel))
     if half.min() < LEAST:
         raise ValueError(
             f"the peak at pixel ({row}, {column}) of an image of {about.image.grid.shape} lies {half.min()} pixels "
             f"from the border; at least {LEAST}, and 3 resolution cells, are needed: focus a larger grid"
         )
-    chip = about.baseband(at - half, at + half + 1)
+    chip = about.baseband(pixel - half, pixel + half + 1)
     for axis in (0, 1):  # a Hann taper: truncation must not leak over the band
         taper = np.cos(np.pi / 2 * np.arange(-half[axis], half[axis] + 1) / (half[axis] + 1)) ** 2
         chip *= np.expand_dims(taper, 1 - axis)
@@ -186,9 +186,9 @@ def _bands(about: ImageInterpolator) -> tuple[list[float], tuple[float, float]]:
 def _middle(occupied: np.ndarray) -> tuple[float, float]:
     """Middle and half width, cycles per pixel, of the band outside the longest run of frequencies (n,) that are not
     occupied; frequencies in the order of the FFT, which go round in a circle."""
-    n, at = len(occupied), np.flatnonzero(occupied)
-    gaps = np.diff(np.append(at, at[0] + n))
+    n, numbers = len(occupied), np.flatnonzero(occupied)
+    gaps = np.diff(np.append(numbers, numbers[0] + n))
     k = int(gaps.argmax())
-    low, width = at[(k + 1) % len(at)], n - gaps[k]  # the band begins behind the gap
+    low, width = numbers[(k + 1) % len(numbers)], n - gaps[k]  # the band begins behind the gap
     middle = (low + width / 2) / n
     return float(middle - np.rint(middle)), float(width / 2 / n)

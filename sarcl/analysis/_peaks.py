@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..base import validation
 from ..model.image import Image
@@ -13,7 +12,7 @@ from ._surface import pixel_of, place_of, surface_at
 
 def brightest(image: Image) -> tuple[int, int]:
     """Row and column of the pixel of largest modulus; rows are read in blocks."""
-    best, at = 0.0, None
+    best, pixel = 0.0, None
     n_rows, n_columns = image.grid.shape
     block = max(1, 2**22 // n_columns)
     for first in range(0, n_rows, block):
@@ -22,29 +21,29 @@ def brightest(image: Image) -> tuple[int, int]:
         level = np.abs(part)
         i = int(level.argmax())
         if level.flat[i] > best:
-            best, at = float(level.flat[i]), (first + i // n_columns, i % n_columns)
-    if at is None:
+            best, pixel = float(level.flat[i]), (first + i // n_columns, i % n_columns)
+    if pixel is None:
         raise ValueError("the image is zero everywhere; there is no point to measure")
-    return at
+    return pixel
 
 
 def brightest_around(image: Image, position: np.ndarray, reach: float) -> tuple[int, int]:
     """Row and column of the brightest pixel within `reach` m of a position or, as long as one is brighter, of that."""
     shape = np.array(image.grid.shape)
-    at = np.clip(np.rint(pixel_of(image, position)).astype(int), 0, shape - 1)
-    spacing = surface_at(image, *at).spacing_at(*at)
+    pixel = np.clip(np.rint(pixel_of(image, position)).astype(int), 0, shape - 1)
+    spacing = surface_at(image, *pixel).spacing_at(*pixel)
     half = np.ceil(reach / np.array(spacing)).astype(int)
     while True:
-        low, high = np.maximum(at - half, 0), np.minimum(at + half + 1, shape)
+        low, high = np.maximum(pixel - half, 0), np.minimum(pixel + half + 1, shape)
         level = np.abs(np.asarray(image.data[low[0] : high[0], low[1] : high[1]]))
         level = np.where(np.isfinite(level), level, 0)
-        best = np.array(np.unravel_index(level.argmax(), level.shape)) + low
-        if not level.max() > level[tuple(at - low)]:
-            return int(at[0]), int(at[1])
-        at = best
+        peak = np.array(np.unravel_index(level.argmax(), level.shape)) + low
+        if not level.max() > level[tuple(pixel - low)]:
+            return int(pixel[0]), int(pixel[1])
+        pixel = peak
 
 
-def peak_near(image: Image, near: Any) -> tuple[int, int]:
+def peak_near(image: Image, near: ArrayLike) -> tuple[int, int]:
     """Row and column of the highest peak within two cells of `near`; the cell is the peak's half-power width."""
     near = validation.array("near", near, np.float64, (3,))
     shape = np.array(image.grid.shape)
@@ -63,10 +62,10 @@ def peak_near(image: Image, near: Any) -> tuple[int, int]:
         i, j = np.array(np.unravel_index(searched.argmax(), searched.shape)) + a
         if level[i, j] == 0:
             raise ValueError(f"the image is zero around near {place(near)}; there is no point to measure")
-        wanted = 2 * np.array([_run(level[:, j], i), _run(level[i], j)])
-        if (wanted <= radius).all():
+        cells = 2 * np.array([_run(level[:, j], i), _run(level[i], j)])
+        if (cells <= radius).all():
             break
-        radius = np.maximum(radius, wanted)
+        radius = np.maximum(radius, cells)
     if level[i, j] < level[max(i - 1, 0) : i + 2, max(j - 1, 0) : j + 2].max():
         uphill = place_of(image, int(i + low[0]), int(j + low[1]))
         raise ValueError(
@@ -76,11 +75,11 @@ def peak_near(image: Image, near: Any) -> tuple[int, int]:
     return int(i + low[0]), int(j + low[1])
 
 
-def _run(level: np.ndarray, at: int) -> int:
+def _run(level: np.ndarray, index: int) -> int:
     """Number of contiguous pixels about `at` where the power is at least half of that at `at`."""
-    below = level**2 < level[at] ** 2 / 2
-    after = below[at:].argmax() if below[at:].any() else len(level) - at
-    before = below[at::-1].argmax() if below[at::-1].any() else at + 1
+    below = level**2 < level[index] ** 2 / 2
+    after = below[index:].argmax() if below[index:].any() else len(level) - index
+    before = below[index::-1].argmax() if below[index::-1].any() else index + 1
     return int(after + before - 1)
 
 

@@ -56,8 +56,8 @@ class LocalPlane:
 
     def index(self, position: np.ndarray) -> np.ndarray:
         """Fractional (row, column) (..., 2) of positions, m (..., 3), projected on the plane along its normal."""
-        found = (np.asarray(position) - self.origin) @ np.linalg.pinv(np.stack([self.down, self.across]))
-        return np.asarray(found + np.array([self.row, self.column]))
+        steps = (np.asarray(position) - self.origin) @ np.linalg.pinv(np.stack([self.down, self.across]))
+        return np.asarray(steps + np.array([self.row, self.column]))
 
     def normal_at(self, row: float, column: float) -> np.ndarray:
         """Unit normal (3,)."""
@@ -80,8 +80,8 @@ Surface = ImageGrid | LocalPlane
 
 
 def surface_at(image: Image, row: float, column: float) -> Surface:
-    """What the response at fractional indices is measured on: the grid itself where it is a plane or by range_doppler,
-    else the plane that touches it there."""
+    """The surface on which the response at fractional indices is measured: the grid itself where it is a plane or by
+    range_doppler, else the plane that touches it there."""
     if has_surface(image.grid):
         return image.grid
     return LocalPlane.about(image.grid, row, column)

@@ -32,7 +32,7 @@ MARGIN = 18  # pixels that the interpolator may need on each side
 STEPS = 32  # points of a cut per IRW
 FARTHEST = 12  # steps, three pixels of the widest spacing: the peak is nearer to the brightest pixel
 MOST_STEPS = 40  # along both axes, of one length
-FINER = 4  # of the last steps: the response is no parabola over the first
+FINER = 4  # ratio of the first steps to the last ones: the response is no parabola over the first
 STRAIGHT = 0.98  # cosine of the angle to a cut within which something lies "in range" or "in cross-range"
 NAMES = "range", "cross-range"
 
@@ -99,9 +99,12 @@ class PointResponse:
             for cut, irw, pslr, islr in zip(self.cuts, self.irw, self.pslr, self.islr, strict=True)
         )
         return curves(
-            [(cut.name, cut.distance, cut.decibels()) for cut in self.cuts], "from the peak (m)", floor_db, title,
+            [(cut.name, cut.distance, cut.decibels()) for cut in self.cuts],
+            "from the peak (m)",
+            floor_db,
+            title,
             f"{caption}. Peak at {place(self.position)} m, {level:.2f} dBsm if calibrated.",
-        )  # fmt: skip
+        )
 
     def __str__(self) -> str:
         amplitude = abs(self.peak) / self.gain
@@ -152,11 +155,11 @@ def measure(image: Image, near: ArrayLike | None = None) -> PointResponse | tupl
     validation.instance("image", image, Image)
     _check(image)
     if near is None:
-        return _measured(image, *brightest(image))
+        return _measure_peak(image, *brightest(image))
     if validation.ndim("near", near) != 2:
-        return _measured(image, *peak_near(image, near))
+        return _measure_peak(image, *peak_near(image, near))
     places = validation.array("near", near, np.float64, ("n", 3))
-    return tuple(_measured(image, *peak_near(image, one)) for one in places)
+    return tuple(_measure_peak(image, *peak_near(image, position)) for position in places)
 
 
 class _Outshone(Exception):
@@ -166,18 +169,18 @@ class _Outshone(Exception):
         self.position, self.axis, self.name, self.cut = position, axis, name, cut
 
 
-def _measured(image: Image, row: int, column: int) -> PointResponse:
+def _measure_peak(image: Image, row: int, column: int) -> PointResponse:
     """The response of the peak at a pixel; ValueError names the strongest pixel in whose response it lies."""
     try:
         return _response(image, row, column)
     except _Outshone as exc:
         weak = exc
-    at = brightest_around(image, weak.position + weak.cut.lobe * weak.axis, REACH * weak.cut.irw)
-    source = place_of(image, *at)
-    away = source - weak.position
-    distance = float(np.linalg.norm(away))
-    direction = f" in {weak.name}" if abs(away @ weak.axis) > STRAIGHT * distance else ""
-    decibels = 20 * np.log10(np.abs(image.data[at]) / np.abs(image.data[row, column]))
+    pixel = brightest_around(image, weak.position + weak.cut.lobe * weak.axis, REACH * weak.cut.irw)
+    source = place_of(image, *pixel)
+    offset = source - weak.position
+    distance = float(np.linalg.norm(offset))
+    direction = f" in {weak.name}" if abs(offset @ weak.axis) > STRAIGHT * distance else ""
+    decibels = 20 * np.log10(np.abs(image.data[pixel]) / np.abs(image.data[row, column]))
     raise ValueError(
         f"the peak at {place(weak.position)} lies in the response of something {decibels:.1f} dB stronger, "
         f"{distance:.3g} m away{direction}; measure that with near={place(source)}"
@@ -195,10 +198,10 @@ def _response(image: Image, row: int, column: int) -> PointResponse:
         def values(t: np.ndarray) -> np.ndarray:
             return interpolated(position + t[:, None] * axis)
 
-        made = _cut(values, interpolated.room(position, axis), interpolated.step, name)
-        if made.pslr >= 0:
-            raise _Outshone(position, axis, name, made)
-        return made
+        response = _cut(values, interpolated.room(position, axis), interpolated.step, name)
+        if response.pslr >= 0:
+            raise _Outshone(position, axis, name, response)
+        return response
 
     along, across = (cut(axis, name) for axis, name in zip(axes, NAMES, strict=True))
     if peak is None:
@@ -227,10 +230,10 @@ def _check(image: Image) -> None:
             f"the grid lists points of shape {image.grid.shape}; cuts need rows and columns of a surface: focus on an "
             "ImageGrid.plane, or list the points row by row"
         )
-    wanted = {"frequency": "the centre frequency, Hz", "tx": "the antenna at mid-aperture, m (3,)"}
-    for name, what in wanted.items():
+    needed = {"frequency": "the centre frequency, Hz", "tx": "the antenna at mid-aperture, m (3,)"}
+    for name, meaning in needed.items():
         if getattr(image, name) is None:
-            raise ValueError(f"image.{name} is None, and the carrier follows from it; set it to {what}")
+            raise ValueError(f"image.{name} is None, and the carrier follows from it; set it to {meaning}")
 
 
 def _axes(interpolated: ImageInterpolator, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -269,9 +272,9 @@ def _move(interpolated: ImageInterpolator, x: np.ndarray, step: np.ndarray) -> n
     """From x to the maximum of the parabola through log |I| at x and a step, m (3,), on either side of it; at most a
     step."""
     values = np.abs(interpolated(x + np.array([[-1], [0], [1]]) * step))
-    left, middle, right = np.log(np.maximum(values, 1e-300))
-    bend = left - 2 * middle + right
-    move = (left - right) / (2 * bend) if bend < 0 else np.sign(right - left)
+    before, middle, after = np.log(np.maximum(values, 1e-300))
+    bend = before - 2 * middle + after
+    move = (before - after) / (2 * bend) if bend < 0 else np.sign(after - before)
     return np.asarray(np.clip(move, -1, 1) * step)
 
 
@@ -305,9 +308,9 @@ def _cut(values: Callable[[np.ndarray], np.ndarray], room: float, step: float, n
     rising = np.diff(p) > 0
     if not (rising[n:].any() and (~rising[:n]).any()):
         raise ValueError(f"in {name} the main lobe has no end within {reach:.1f} IRW: the image is not focused")
-    right, left = n + int(rising[n:].argmax()), n - int((~rising[:n])[::-1].argmax())
-    inside = _integral(p[left : right + 1])
-    lobes = np.where((t < t[left]) | (t > t[right]), p, 0)
+    end, start = n + int(rising[n:].argmax()), n - int((~rising[:n])[::-1].argmax())
+    inside = _integral(p[start : end + 1])
+    lobes = np.where((t < t[start]) | (t > t[end]), p, 0)
     i = int(lobes.argmax())
     highest, lobe = lobes[i], t[i]
     if 0 < i < 2 * n and p[i] >= max(p[i - 1], p[i + 1]):  # maximum of the parabola through three points

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..base import wgs84
 
 ITERATIONS = 30
-FOUND = 1e-6  # of a cell: positions that the iteration leaves farther away are outside the grid
+FOUND = 1e-6  # step of the iteration, in cells, at which a position is found; others lie outside the grid
 SAME = 1.2e-13  # degrees, 1.3e-8 m, twice the rounding of longitudes up to 360: positions nearer to a point are at it
 ANTIPODE = -1 + 1e-9  # cosine of the angle from the middle: beyond, stereographic coordinates are set to 1e6
 POLAR = 80.0  # degrees of latitude
@@ -38,21 +38,21 @@ class Axes:
         """
         if (longitude != longitude[0]).any() or (latitude != latitude[:, :1]).any():
             return None
-        made = cls(longitude[0].copy(), latitude[:, 0].copy())
-        if np.abs(np.diff(made.longitude)).max() >= 180:
+        grid_axes = cls(longitude[0].copy(), latitude[:, 0].copy())
+        if np.abs(np.diff(grid_axes.longitude)).max() >= 180:
             raise ValueError(
                 "longitude jumps by 180 degrees or more between neighbours; across the antimeridian let it go on "
                 "beyond 180 (179, 180, 181)"
             )
-        for name, axis in (("longitude", made.longitude), ("latitude", made.latitude)):
+        for name, axis in (("longitude", grid_axes.longitude), ("latitude", grid_axes.latitude)):
             steps = np.diff(axis)
             if not ((steps > 0).all() or (steps < 0).all()):
-                at = int(np.argmax(steps * np.sign(axis[-1] - axis[0]) <= 0)) + 1
+                i = int(np.argmax(steps * np.sign(axis[-1] - axis[0]) <= 0)) + 1
                 raise ValueError(
-                    f"{name} {axis[at]:.9g} at {at} follows {axis[at - 1]:.9g}; it must increase or decrease along the "
+                    f"{name} {axis[i]:.9g} at {i} follows {axis[i - 1]:.9g}; it must increase or decrease along the "
                     "grid: sort it, with the heights"
                 )
-        return made
+        return grid_axes
 
     @property
     def is_around(self) -> bool:
@@ -120,33 +120,34 @@ class Curvilinear:
             )
         size = np.array(longitude.shape) - 1
         corner = np.array([[0, 0], [0, size[1]], [size[0], 0], size])
-        known = np.column_stack([points[:, corner[:, 0], corner[:, 1]].T, np.ones(4)])
-        return cls(is_polar, middle, axes, points, np.linalg.lstsq(known, corner.astype(np.float64), rcond=None)[0].T)
+        coordinates = np.column_stack([points[:, corner[:, 0], corner[:, 1]].T, np.ones(4)])
+        affine = np.linalg.lstsq(coordinates, corner.astype(np.float64), rcond=None)[0].T
+        return cls(is_polar, middle, axes, points, affine)
 
     def at(self, longitude: Array, latitude: Array) -> Array:
-        """Fractional (row, column) (2, n) of degrees (n,), whole at the points; NaN where none was found."""
-        wanted = _coordinates(self.is_polar, self.middle, self.axes, longitude, latitude)
+        """Fractional (row, column) (2, n) of degrees (n,), whole at the points; NaN where there is none."""
+        target = _coordinates(self.is_polar, self.middle, self.axes, longitude, latitude)
         size = np.array(self.points.shape[1:])[:, None]
-        at = self.affine[:, :2] @ wanted + self.affine[:, 2:]
+        index = self.affine[:, :2] @ target + self.affine[:, 2:]
         for _ in range(ITERATIONS):
-            at = np.clip(at, -2.0, size + 1.0)
-            low = np.clip(np.floor(np.nan_to_num(at)).astype(np.int64), 0, size - 2)
-            (i, j), (u, v) = low, at - low
+            index = np.clip(index, -2.0, size + 1.0)
+            low = np.clip(np.floor(np.nan_to_num(index)).astype(np.int64), 0, size - 2)
+            (i, j), (u, v) = low, index - low
             a, b, c, d = (self.points[:, i + m, j + n] for m in (0, 1) for n in (0, 1))
             down, right = (1 - v) * (c - a) + v * (d - b), (1 - u) * (b - a) + u * (d - c)
-            off = wanted - ((1 - v) * a + v * b + u * down)
+            off = target - ((1 - v) * a + v * b + u * down)
             area = down[0] * right[1] - down[1] * right[0]
             with np.errstate(divide="ignore", invalid="ignore"):
                 step = np.stack([off[0] * right[1] - off[1] * right[0], down[0] * off[1] - down[1] * off[0]]) / area
-            at = at + step
-            inside = ((at > -0.5) & (at < size - 0.5)).all(axis=0)
+            index = index + step
+            inside = ((index > -0.5) & (index < size - 0.5)).all(axis=0)
             if not (np.abs(step[:, inside]) > 1e-3 * FOUND).any():
                 break
         same = np.radians(SAME) if self.is_polar else SAME
-        found = (np.abs(step) <= FOUND).all(axis=0) | (np.abs(off) <= same).all(axis=0)
-        whole = np.clip(np.rint(np.nan_to_num(at)).astype(np.int64), 0, size - 1)
-        is_point = (np.abs(wanted - self.points[:, whole[0], whole[1]]) <= same).all(axis=0)
-        return np.where(is_point, whole, np.where(found, at, np.nan))
+        is_found = (np.abs(step) <= FOUND).all(axis=0) | (np.abs(off) <= same).all(axis=0)
+        nearest = np.clip(np.rint(np.nan_to_num(index)).astype(np.int64), 0, size - 1)
+        is_point = (np.abs(target - self.points[:, nearest[0], nearest[1]]) <= same).all(axis=0)
+        return np.where(is_point, nearest, np.where(is_found, index, np.nan))
 
 
 def _blocks(shape: tuple[int, ...]) -> list[slice]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,14 +14,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..base import validation, wgs84
 from ..io import elevation
+from ..io.elevation import Geoid
 from ._grid_index import Axes, Curvilinear
 
 if TYPE_CHECKING:
     from ..base.types import PathLike
 
 FARTHEST = 1e6  # degrees: more is no place
+SAME = 1e-9  # distance to a point, in cells, below which a position is at it
 HIGHEST = 20e3  # m: the Earth's surface reaches from -10 935 to 8849
-Geoid = str | Path | ArrayLike | Callable[[np.ndarray, np.ndarray], ArrayLike] | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,10 +58,10 @@ class ElevationModel:
             raise ValueError(f"height reaches {np.nanmax(np.abs(height)):.6g} m, which no land has; give metres")
         for name, axis in (("longitude", 1), ("latitude", 0)):
             validation.ndim(name, getattr(self, name))
-            given = np.asarray(getattr(self, name))
-            shape = (height.shape[axis],) if given.ndim == 1 else height.shape
-            values = validation.array(name, given, np.float64, shape)
-            if given.ndim == 1:
+            degrees = np.asarray(getattr(self, name))
+            shape = (height.shape[axis],) if degrees.ndim == 1 else height.shape
+            values = validation.array(name, degrees, np.float64, shape)
+            if degrees.ndim == 1:
                 values = np.broadcast_to(values if axis else values[:, None], height.shape)
             object.__setattr__(self, name, values)
         if np.abs(self.latitude).max() > 90:
@@ -111,12 +112,16 @@ class ElevationModel:
         except ValueError:
             raise ValueError(f"longitude has shape {lon.shape} and latitude {lat.shape}; give equal ones") from None
         shape, (index, height) = lon.shape, self._index
-        known = (np.abs(lon) < FARTHEST) & (np.abs(lat) < FARTHEST)
-        at = index.at(*(np.where(known, v, w[0, 0]).ravel() for v, w in ((lon, self.longitude), (lat, self.latitude))))
-        at = np.where(np.abs(at - np.rint(at)) < 1e-9, np.rint(at), at)  # a point needs no height of its neighbours
+        is_place = (np.abs(lon) < FARTHEST) & (np.abs(lat) < FARTHEST)
+        degrees = ((lon, self.longitude[0, 0]), (lat, self.latitude[0, 0]))
+        position = index.at(*(np.where(is_place, value, corner).ravel() for value, corner in degrees))
+        nearest = np.rint(position)
+        position = np.where(
+            np.abs(position - nearest) < SAME, nearest, position
+        )  # a point needs no neighbours' heights
         size = np.array(height.shape)[:, None] - 1
-        inside = known.ravel() & ((at >= -1e-6) & (at <= size + 1e-6)).all(axis=0)
-        return np.where(inside, _bilinear(height, np.clip(at, 0, size)), np.nan).reshape(shape)
+        is_inside = is_place.ravel() & ((position >= -1e-6) & (position <= size + 1e-6)).all(axis=0)
+        return np.where(is_inside, _bilinear(height, np.clip(position, 0, size)), np.nan).reshape(shape)
 
     @functools.cached_property
     def _index(self) -> tuple[Axes | Curvilinear, NDArray[np.float64]]:
@@ -141,8 +146,8 @@ class ElevationModel:
             raise ValueError(f"spacing is {steps_m.tolist()} m; give two distances above 0, (north, east)")
         tile = elevation.Tile(self.longitude, self.latitude, self.height)
         origin, axes = elevation.local_frame(tile, center)
-        known = (wgs84.ecef(self.longitude, self.latitude, np.nan_to_num(self.height)) - origin) @ axes.T
-        low, high = (f(known.reshape(-1, 3), axis=0) for f in (np.min, np.max))
+        corners = (wgs84.ecef(self.longitude, self.latitude, np.nan_to_num(self.height)) - origin) @ axes.T
+        low, high = (f(corners.reshape(-1, 3), axis=0) for f in (np.min, np.max))
         steps = [int(np.floor((high[a] - low[a]) / d * (1 + 1e-9))) + 1 for a, d in ((1, steps_m[0]), (0, steps_m[1]))]
         if math.prod(steps) > elevation.MOST_POINTS:
             raise MemoryError(
@@ -151,9 +156,9 @@ class ElevationModel:
             )
         y = (low[1] + high[1]) / 2 + (np.arange(steps[0]) - (steps[0] - 1) / 2) * steps_m[0]
         x = (low[0] + high[0]) / 2 + (np.arange(steps[1]) - (steps[1] - 1) / 2) * steps_m[1]
-        out = np.empty((*steps, 3))
+        positions = np.empty((*steps, 3))
         for row, north in enumerate(y):
-            local = np.stack([x, np.full_like(x, north), np.full_like(x, known[..., 2].mean())], axis=-1)
+            local = np.stack([x, np.full_like(x, north), np.full_like(x, corners[..., 2].mean())], axis=-1)
             for _ in range(10):  # the vertical of the frame is nearly the ellipsoid's normal: a step is nearly exact
                 lon, lat, height = wgs84.geodetic(local @ axes + origin)
                 step = self.heights_at(lon, lat) - height
@@ -161,8 +166,8 @@ class ElevationModel:
                 if not (np.abs(step) > 1e-6).any():
                     break
             local[np.isnan(local[:, 2])] = np.nan
-            out[row] = local
-        return out @ axes + origin if frame == "ecef" else out
+            positions[row] = local
+        return positions @ axes + origin if frame == "ecef" else positions
 
 
 def _bilinear(values: NDArray[np.float64], at: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -170,12 +175,12 @@ def _bilinear(values: NDArray[np.float64], at: NDArray[np.float64]) -> NDArray[n
     size = np.array(values.shape)[:, None]
     low = np.clip(np.nan_to_num(np.floor(at)), 0, size - 2).astype(np.int64)  # NaN in, NaN out: by the weights
     (i, j), (u, v) = low, at - low
-    out = np.zeros(at.shape[1])
+    total = np.zeros(at.shape[1])
     for weight, corner in (
         ((1 - u) * (1 - v), values[i, j]),
         ((1 - u) * v, values[i, j + 1]),
         (u * (1 - v), values[i + 1, j]),
         (u * v, values[i + 1, j + 1]),
     ):
-        out += np.where(weight == 0, 0.0, weight * corner)
-    return out
+        total += np.where(weight == 0, 0.0, weight * corner)
+    return total

@@ -13,6 +13,10 @@ from .rotation import GM, J2, RATE, to_earth_fixed
 FARTHEST = 1e11  # m: what is farther from the Earth is in no orbit about it
 
 
+# angles by their names as arguments of Orbit.kepler
+ANGLES = {"inclination": "inclination", "node": "node", "perigee": "argument_of_perigee", "anomaly": "mean_anomaly"}
+
+
 @dataclass(frozen=True, eq=False)
 class KeplerElements:
     """Elements at time 0, and their rates.
@@ -32,14 +36,10 @@ class KeplerElements:
     greenwich: float
     with_j2: bool
 
-    @classmethod
-    def checked(
-        cls, semi_major_axis: float, eccentricity: float, inclination: float, node: float, argument_of_perigee: float,
-        mean_anomaly: float, *, greenwich: float, j2: bool,
-    ) -> KeplerElements:  # fmt: skip
-        """Elements that are a user's arguments. ValueError for those that are no ellipse above the Earth's surface."""
-        a = validation.number("semi_major_axis", semi_major_axis, above=0)
-        e = validation.number("eccentricity", eccentricity, least=0)
+    def __post_init__(self) -> None:
+        """ValueError for elements that are no ellipse above the Earth's surface, by the names of Orbit.kepler."""
+        a = validation.number("semi_major_axis", self.semi_major_axis, above=0)
+        e = validation.number("eccentricity", self.eccentricity, least=0)
         if a > FARTHEST:
             raise ValueError(f"semi_major_axis is {a:g} m, farther than the Sun; give m, from the Earth's centre")
         if e >= 1:
@@ -49,12 +49,16 @@ class KeplerElements:
                 f"the perigee is {a * (1 - e):.7g} m from the Earth's centre, below its surface; give a larger "
                 "semi_major_axis (m, from the centre), or a smaller eccentricity"
             )
-        names = ("inclination", "node", "argument_of_perigee", "mean_anomaly")
-        given = (inclination, node, argument_of_perigee, mean_anomaly)
-        angles = [validation.number(n, value) for n, value in zip(names, given, strict=True)]
-        if not 0 <= angles[0] <= np.pi:
-            raise ValueError(f"inclination is {angles[0]:g} rad; it reaches from 0 to pi: was it in degrees?")
-        return cls(a, e, angles[0], angles[1], angles[2], angles[3], greenwich, validation.flag("j2", j2))
+        numbers = {"semi_major_axis": a, "eccentricity": e}
+        for name, argument in ANGLES.items():
+            numbers[name] = validation.number(argument, getattr(self, name))
+        if not 0 <= numbers["inclination"] <= np.pi:
+            raise ValueError(
+                f"inclination is {numbers['inclination']:g} rad; it reaches from 0 to pi: was it in degrees?"
+            )
+        for name, number in numbers.items():
+            object.__setattr__(self, name, number)
+        object.__setattr__(self, "with_j2", validation.flag("j2", self.with_j2))
 
     @property
     def mean_motion(self) -> float:
@@ -103,7 +107,7 @@ class KeplerElements:
         return positions, velocities
 
     def describe(self) -> str:
-        """How positions are computed."""
+        """Words for the computation of positions."""
         drift = "with the secular drift of J2" if self.with_j2 else "without perturbations"
         return f"Kepler elements {drift}, in closed form"
 

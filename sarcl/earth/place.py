@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..base import validation, wgs84
 from ..io import elevation
-from .elevation import Geoid
+from ..io.elevation import Geoid
 
 
 @dataclass(frozen=True)
@@ -34,13 +34,7 @@ class Place:
 
     @classmethod
     def above(
-        cls,
-        longitude: float,
-        latitude: float,
-        height: float = 0.0,
-        *,
-        heights: str = "ellipsoid",
-        geoid: Geoid = None,
+        cls, longitude: float, latitude: float, height: float = 0.0, *, heights: str = "ellipsoid", geoid: Geoid = None
     ) -> Place:
         """A place whose height is above what `heights` names, as in `Scene.from_dem`.
 
@@ -62,8 +56,8 @@ class Place:
                 f"the height is above {heights!r}, not above the ellipsoid; give the undulation as geoid: a number "
                 "(m), or a raster file of it"
             )
-        at = np.array([[place.longitude]]), np.array([[place.latitude]])
-        rise = elevation.undulation(geoid, *at, "the place", heights)
+        degrees = np.array([[place.longitude]]), np.array([[place.latitude]])
+        rise = elevation.undulation(geoid, *degrees, "the place", heights)
         return cls(place.longitude, place.latitude, place.height + float(rise[0, 0]))
 
     @cached_property

@@ -13,13 +13,14 @@ from .rotation import GM, spin
 LEAST_STATES = 4
 # Numbers of states per interpolation, cheapest first: Hermite uses velocities too, Lagrange positions alone.
 HERMITE, LAGRANGE = (2, 3, 4, 5, 6, 7, 8), (4, 6, 8, 10, 12, 14)
-FINE = 1e-7  # m: an error so small needs no higher order
+ORDER_MARGIN = 1.5  # ratio to the least error of all orders: the cheapest order within it is taken
+FINE = 1e-7  # interpolation error, m, that needs no higher order
 WORST = 1.0  # m: states that do not fit their neighbours better are refused
 VELOCITY_MISFIT = 1.0  # m/s: the same of velocities
 DEEPEST = -20e3  # m: positions farther below the ellipsoid are refused
-MISFIT = 0.01  # of gravity and the Earth's rotation: states that accelerate otherwise are refused. J2 has 0.003
-INERTIAL = 0.004  # the same where the states accelerate as in an inertial frame
-GAP = 2.1  # of the usual spacing: leaving out a state measures the error over twice the spacing, and no more
+MISFIT = 0.01  # error of accelerations over gravity and the Earth's rotation: J2 causes 0.003
+INERTIAL = 0.004  # the same error where the states accelerate as in an inertial frame
+GAP = 2.1  # ratio of a gap to the usual spacing: leaving out a state measures the error over twice the spacing
 BLOCK = 32_768  # times that are interpolated at once
 
 
@@ -58,14 +59,14 @@ class StateVectors:
             velocities = _slopes(times, positions, min(len(times), 8))
         else:
             _check_velocities(times, positions, velocities)
-        tried = []
+        candidates = []
         for hermite, counts in ((True, HERMITE), (False, LAGRANGE)):
             for n in counts:
                 if n < len(times):
-                    misfit = _left_out(times, positions, velocities, n, hermite)
-                    tried.append((float(misfit.max()), n, hermite, int(misfit.argmax()) + 1))
-        least = min(t[0] for t in tried)
-        error, n, hermite, worst = next(t for t in tried if t[0] <= max(1.5 * least, FINE))
+                    misfit = _leave_one_out(times, positions, velocities, n, hermite)
+                    candidates.append((float(misfit.max()), n, hermite, int(misfit.argmax()) + 1))
+        least = min(t[0] for t in candidates)
+        error, n, hermite, worst = next(t for t in candidates if t[0] <= max(ORDER_MARGIN * least, FINE))
         if not error <= WORST:
             raise ValueError(
                 f"positions[{worst}] (at {times[worst]:g} s) is {error:.3g} m away from the curve through the other "
@@ -88,7 +89,7 @@ class StateVectors:
         return positions, velocities
 
     def describe(self) -> str:
-        """How positions are computed, and the error that was measured."""
+        """Words for the computation of positions and its measured error."""
         step = np.median(np.diff(self.times))
         kind, used = ("Hermite", " and velocities") if self.hermite else ("Lagrange", "")
         degree = 2 * self.n_nodes - 1 if self.hermite else self.n_nodes - 1
@@ -131,15 +132,15 @@ def _sum(weights: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[n
     return np.asarray(np.einsum("nm,nmk->nk", weights, values))
 
 
-def _left_out(
+def _leave_one_out(
     times: NDArray[np.float64], positions: NDArray[np.float64], velocities: NDArray[np.float64], n: int, hermite: bool
 ) -> NDArray[np.float64]:
     """Distances, m, of all states but the first and the last from their interpolation by n neighbours."""
     k = np.arange(1, len(times) - 1)
     nodes = np.clip(k - n // 2, 0, len(times) - n - 1)[:, None] + np.arange(n)
     nodes += nodes >= k[:, None]
-    made, _ = interpolate(times[nodes], positions[nodes], velocities[nodes] if hermite else None, times[k])
-    return np.asarray(np.linalg.norm(made - positions[k], axis=1))
+    predicted, _ = interpolate(times[nodes], positions[nodes], velocities[nodes] if hermite else None, times[k])
+    return np.asarray(np.linalg.norm(predicted - positions[k], axis=1))
 
 
 def _check_times(times: NDArray[np.float64]) -> None:
@@ -147,17 +148,17 @@ def _check_times(times: NDArray[np.float64]) -> None:
         raise ValueError(f"times has {len(times)} states; an orbit needs at least {LEAST_STATES}: give more states")
     steps = np.diff(times)
     if not (steps > 0).all():
-        at = int(np.argmax(steps <= 0)) + 1
-        what = "repeats" if times[at] == times[at - 1] else "is before"
+        i = int(np.argmax(steps <= 0)) + 1
+        what = "repeats" if times[i] == times[i - 1] else "is before"
         raise ValueError(
-            f"times[{at}] = {times[at]:.9g} s {what} times[{at - 1}] = {times[at - 1]:.9g} s; times must increase: "
+            f"times[{i}] = {times[i]:.9g} s {what} times[{i - 1}] = {times[i - 1]:.9g} s; times must increase: "
             "sort the states by time, and keep one of each"
         )
     usual = float(np.median(steps))
     if steps.max() > GAP * usual:
-        at = int(np.argmax(steps))
+        i = int(np.argmax(steps))
         raise ValueError(
-            f"the states have a gap of {steps[at]:g} s from times[{at}] = {times[at]:.9g} s on, where they are usually "
+            f"the states have a gap of {steps[i]:g} s from times[{i}] = {times[i]:.9g} s on, where they are usually "
             f"{usual:g} s apart; give the missing states, or make one orbit before the gap and one after it"
         )
 
@@ -165,18 +166,18 @@ def _check_times(times: NDArray[np.float64]) -> None:
 def _check_heights(positions: NDArray[np.float64]) -> None:
     height = wgs84.geodetic(positions)[2]
     if (height < DEEPEST).any():
-        at = int(np.argmin(height))
+        i = int(np.argmin(height))
         raise ValueError(
-            f"positions[{at}] is {np.linalg.norm(positions[at]):.7g} m from the Earth's centre, inside the Earth; give "
+            f"positions[{i}] is {np.linalg.norm(positions[i]):.7g} m from the Earth's centre, inside the Earth; give "
             "Earth-fixed positions in m: are they in km?"
         )
 
 
 def _check_fall(times: NDArray[np.float64], positions: NDArray[np.float64], velocities: NDArray[np.float64]) -> None:
     """ValueError where accelerations are not those of satellites over the rotating Earth, g - 2 w x v - w x (w x r)."""
-    most = min(len(times), 8)
+    n_nodes = min(len(times), 8)
     inner = slice(1, -1)
-    found, other = (_slopes(times, velocities, n)[inner] for n in (most, most - 1))
+    acceleration, coarser = (_slopes(times, velocities, n)[inner] for n in (n_nodes, n_nodes - 1))
     p, v = positions[inner], velocities[inner]
     gravity = -GM * p / np.linalg.norm(p, axis=1, keepdims=True) ** 3
     turn = -2 * spin(v) - spin(spin(p))
@@ -184,10 +185,10 @@ def _check_fall(times: NDArray[np.float64], positions: NDArray[np.float64], velo
     def size(a: NDArray[np.float64]) -> float:
         return float(np.sqrt((a**2).sum(axis=1).mean()))
 
-    off, off_inertial = size(found - gravity - turn), size(found - gravity)
-    scale, doubt = size(gravity) + size(turn), 10 * size(found - other)
-    is_inertial = off_inertial < 0.3 * off
-    if off > (INERTIAL if is_inertial else MISFIT) * scale + doubt:
+    misfit, misfit_inertial = size(acceleration - gravity - turn), size(acceleration - gravity)
+    scale, uncertainty = size(gravity) + size(turn), 10 * size(acceleration - coarser)
+    is_inertial = misfit_inertial < 0.3 * misfit
+    if misfit > (INERTIAL if is_inertial else MISFIT) * scale + uncertainty:
         why = (
             "these are positions and velocities in an inertial frame: turn both by the sidereal time into an "
             "Earth-fixed frame"
@@ -195,7 +196,7 @@ def _check_fall(times: NDArray[np.float64], positions: NDArray[np.float64], velo
             else "check units (m, m/s, s) and the frame"
         )
         raise ValueError(
-            f"the states accelerate by {size(found):.4g} m/s^2, where gravity and the Earth's rotation cause "
+            f"the states accelerate by {size(acceleration):.4g} m/s^2, where gravity and the Earth's rotation cause "
             f"{size(gravity + turn):.4g} m/s^2 there; wanted Earth-fixed states of a satellite: {why}"
         )
 
@@ -204,22 +205,22 @@ def _check_velocities(
     times: NDArray[np.float64], positions: NDArray[np.float64], velocities: NDArray[np.float64]
 ) -> None:
     derived = [_slopes(times, positions, n) for n in (min(len(times), 8), min(len(times), 8) - 1)]
-    doubt = np.linalg.norm(derived[0] - derived[1], axis=1)  # about the error of the derivative at this spacing
-    off = np.linalg.norm(velocities - derived[0], axis=1)
-    wrong = off > VELOCITY_MISFIT + 10 * doubt
+    uncertainty = np.linalg.norm(derived[0] - derived[1], axis=1)  # about the error of the derivative at this spacing
+    misfit = np.linalg.norm(velocities - derived[0], axis=1)
+    wrong = misfit > VELOCITY_MISFIT + 10 * uncertainty
     if wrong.any():
-        at = int(np.argmax(off - 10 * doubt))
-        inertial = np.linalg.norm(velocities[at] - derived[0][at] - spin(positions[at]))
+        worst = int(np.argmax(misfit - 10 * uncertainty))
+        inertial = np.linalg.norm(velocities[worst] - derived[0][worst] - spin(positions[worst]))
         why = (
             "these are velocities in an inertial frame: subtract the cross product of the Earth's rotation and the "
             "position"
-            if inertial < 0.05 * off[at]
+            if inertial < 0.05 * misfit[worst]
             else "check units (m, m/s, s) and the order of the states"
         )
         if 2 * wrong.sum() <= len(wrong):
             why = "trim these states, or derive the velocities from the positions: velocities=None"
         raise ValueError(
-            f"velocities{_ranges(np.flatnonzero(wrong))} of {len(wrong)} differ by up to {off[wrong].max():.4g} m/s "
+            f"velocities{_ranges(np.flatnonzero(wrong))} of {len(wrong)} differ by up to {misfit[wrong].max():.4g} m/s "
             f"from the derivative of the positions; wanted Earth-fixed velocities: {why}"
         )
 

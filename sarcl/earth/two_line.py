@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .rotation import SIDEREAL_RATE, rotated, sidereal_time
 from .state_vectors import interpolate
+
+if TYPE_CHECKING:
+    from sgp4.api import Satrec
 
 # Name, columns and limits (first included, last not) of the numbers that SGP4 needs, by line
 FIELDS = {
@@ -36,7 +39,7 @@ class TwoLineElements:
     because they leave out rates of small terms: zero-Doppler times would not be times of closest approach.
     """
 
-    satellite: Any
+    satellite: Satrec
     epoch: np.datetime64
     greenwich: float
     lines: tuple[str, str]
@@ -55,13 +58,13 @@ class TwoLineElements:
             raise ImportError("two-line elements need the package sgp4: pip install sarcl[orbits]") from exc
         satellite = Satrec.twoline2rv(line1, line2, WGS72)
         year, day = int(line1[18:20]), line1[20:32].strip()
-        whole, _, part = day.partition(".")
+        day_number, _, fraction = day.partition(".")
         epoch = np.datetime64(f"{year + (1900 if year >= 57 else 2000)}-01-01", "ns")
-        nanoseconds = (int(whole) - 1) * 86_400 * 10**9 + int(part.ljust(8, "0")[:8]) * 864_000
+        nanoseconds = (int(day_number) - 1) * 86_400 * 10**9 + int(fraction.ljust(8, "0")[:8]) * 864_000
         epoch = epoch + np.timedelta64(nanoseconds, "ns")
         return cls(satellite, epoch, sidereal_time(epoch), (line1, line2))
 
-    def __reduce__(self) -> Any:
+    def __reduce__(self) -> tuple[object, tuple[str, str]]:
         """By the lines: sgp4's own object cannot be copied."""
         return type(self).parsed, self.lines
 
@@ -69,34 +72,34 @@ class TwoLineElements:
         """Positions, m, and velocities, m/s (n, 3), as SGP4 gives them: true equator, mean equinox of date (TEME)."""
         positions, velocities = np.empty((len(times), 3)), np.empty((len(times), 3))
         for i, t in enumerate(times.tolist()):
-            failed, positions[i], velocities[i] = self.satellite.sgp4_tsince(t / 60)
-            if failed or not np.isfinite(positions[i]).all():
+            error, positions[i], velocities[i] = self.satellite.sgp4_tsince(t / 60)
+            if error or not np.isfinite(positions[i]).all():
                 from sgp4.api import SGP4_ERRORS
 
                 raise ValueError(
                     f"the two-line elements give no position at {t:g} s from their epoch {self.epoch}: "
-                    f"{SGP4_ERRORS.get(failed, 'not finite')}; use elements of a date that is closer"
+                    f"{SGP4_ERRORS.get(error, 'not finite')}; use elements of a date that is closer"
                 )
         return positions * 1e3, velocities * 1e3
 
     def at(self, times: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Earth-fixed positions, m, and velocities, m/s (n, 3), at times, s (n,)."""
         steps = np.floor(times / STEP).astype(np.int64)[:, None] + np.arange(1 - NODES // 2, NODES // 2 + 1)
-        some, back = np.unique(steps, return_inverse=True)
-        back = back.reshape(steps.shape)
-        known, _ = self.teme(some * STEP)
-        fixed = rotated(-(self.greenwich + SIDEREAL_RATE * (some * STEP)), known)
-        return interpolate(np.asarray(steps * STEP), fixed[back], None, times)
+        nodes, inverse = np.unique(steps, return_inverse=True)
+        inverse = inverse.reshape(steps.shape)
+        inertial, _ = self.teme(nodes * STEP)
+        fixed = rotated(-(self.greenwich + SIDEREAL_RATE * (nodes * STEP)), inertial)
+        return interpolate(np.asarray(steps * STEP), fixed[inverse], None, times)
 
     def describe(self) -> str:
-        """How positions are computed."""
+        """Words for the computation of positions."""
         return (
             f"SGP4 of the two-line elements of {self.epoch} (TEME), rotated by Greenwich mean sidereal time; "
             f"interpolated between positions {STEP:g} s apart"
         )
 
 
-def _check(number: int, line: Any) -> None:
+def _check(number: int, line: object) -> None:
     """ValueError unless `line` is line 1 or 2 of two-line elements, with the right check sum."""
     name = f"line{number}"
     if not isinstance(line, str) or len(line) < 69 or line[:2] != f"{number} ":

@@ -1,4 +1,4 @@
-"""What an antenna above the Earth sees of positions: angles, ranges and Doppler frequencies."""
+"""Angles, ranges and Doppler frequencies of positions seen from an antenna above the Earth."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..base.constants import SPEED_OF_LIGHT
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """How an antenna sees positions, one value for each (...).
+    """Angles, ranges and their derivatives of positions seen from an antenna, one value for each (...).
 
     slant_range   m;  ground_range  m, along the ellipsoid from the point below the antenna
     incidence     rad, at the position, from the ellipsoid's normal to the antenna
@@ -95,11 +95,11 @@ def ground_range(positions: NDArray[np.float64], points: NDArray[np.float64]) ->
     total = np.zeros(angle.shape)
     squares = 1 / (wgs84.SEMI_MAJOR * np.array([1, 1, 1 - wgs84.FLATTENING])) ** 2
     for node, weight in zip(nodes, weights, strict=True):
-        at = (angle * (1 + node) / 2)[..., None]
-        ray, turned = np.cos(at) * first + np.sin(at) * side, np.cos(at) * side - np.sin(at) * first
+        arc = (angle * (1 + node) / 2)[..., None]
+        ray, tangent = np.cos(arc) * first + np.sin(arc) * side, np.cos(arc) * side - np.sin(arc) * first
         density = (ray**2 * squares).sum(axis=-1)
         radius = 1 / np.sqrt(density)
-        slope = -((ray * turned * squares).sum(axis=-1)) / density * radius
+        slope = -((ray * tangent * squares).sum(axis=-1)) / density * radius
         total = total + weight * np.hypot(radius, slope)
     return np.asarray(total * angle / 2)
 

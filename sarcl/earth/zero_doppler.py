@@ -17,7 +17,7 @@ from .viewing import hidden, normal
 States = Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], NDArray[np.float64]]]
 
 COARSE = 60.0  # s: least time between zero-Doppler times of any orbit is half a revolution, 40 minutes
-PAIRS = 4_000_000  # of positions and coarse times that are examined at once
+PAIRS = 4_000_000  # pairs of positions and coarse times that are examined at once
 DOUBT = 50e3  # m: of passes whose first ranges differ by less, all zero-Doppler times are computed
 EXACT = 1e-12  # s: below it, times follow the rounding of positions, 1e-9 m
 EARLY = 1e-9  # s: a zero-Doppler time outside the span by less counts as its end
@@ -38,41 +38,41 @@ def locate(
     antennas, velocities = states(coarse)
     slack = EARLY * (velocities**2).sum(axis=1)
     times, ranges = np.full(len(positions), np.nan), np.full(len(positions), np.nan)
-    passed = np.zeros(len(positions), bool)
+    has_crossing = np.zeros(len(positions), bool)
     count = max(1, PAIRS // len(coarse))
     for first in range(0, len(positions), count):
         x = positions[first : first + count]
         ahead = x @ velocities.T - (antennas * velocities).sum(axis=1)
         row, k = np.nonzero((ahead[:, :-1] >= -slack[:-1]) & (ahead[:, 1:] <= slack[1:]))
-        passed[first + row] = True
+        has_crossing[first + row] = True
         lead = np.clip(ahead[row, k] / np.maximum(ahead[row, k] - ahead[row, k + 1], 1e-300), 0, 1)
         # about where the antenna is then: good to some kilometres, which separates most passes
-        some = antennas[k] + lead[:, None] * (antennas[k + 1] - antennas[k])
-        guess = np.where(hidden(some, x[row]), np.inf, np.linalg.norm(some - x[row], axis=1))
+        antenna = antennas[k] + lead[:, None] * (antennas[k + 1] - antennas[k])
+        guess = np.where(hidden(antenna, x[row]), np.inf, np.linalg.norm(antenna - x[row], axis=1))
         least = np.full(len(x), np.inf)
         np.minimum.at(least, row, guess)
-        for every in (False, True):
-            open_rows = np.isnan(ranges[first + row])
-            use = np.flatnonzero(open_rows & (every | (guess <= least[row] + DOUBT)))
-            if not len(use):
+        for is_thorough in (False, True):
+            is_open = np.isnan(ranges[first + row])
+            candidates = np.flatnonzero(is_open & (is_thorough | (guess <= least[row] + DOUBT)))
+            if not len(candidates):
                 continue
-            i, j = row[use], k[use]
+            i, j = row[candidates], k[candidates]
             t = _crossings(states, x[i], coarse[j], coarse[j + 1], ahead[i, j], ahead[i, j + 1])
-            there, _ = states(t)
-            distance = np.where(hidden(there, x[i]), np.inf, np.linalg.norm(x[i] - there, axis=1))
+            antenna_at_t, _ = states(t)
+            distance = np.where(hidden(antenna_at_t, x[i]), np.inf, np.linalg.norm(x[i] - antenna_at_t, axis=1))
             order = np.argsort(-distance, kind="stable")  # the nearest is written last
             order = order[np.isfinite(distance[order])]
             times[first + i[order]], ranges[first + i[order]] = t[order], distance[order]
     if np.isnan(ranges).any():
-        at = int(np.argmax(np.isnan(ranges)))
-        lon, lat, _ = wgs84.geodetic(positions[at])
+        number = int(np.argmax(np.isnan(ranges)))
+        lon, lat, _ = wgs84.geodetic(positions[number])
         why = (
             "it is behind the horizon at every zero-Doppler time"
-            if passed[at]
+            if has_crossing[number]
             else "it has no zero-Doppler time (closest approach)"
         )
         raise ValueError(
-            f"positions[{at}] (longitude {lon:.4f}, latitude {lat:.4f}) is never seen: {why} from {start:.9g} to "
+            f"positions[{number}] (longitude {lon:.4f}, latitude {lat:.4f}) is never seen: {why} from {start:.9g} to "
             f"{stop:.9g} s; give an orbit over a longer span, or a scene that the satellite passes"
         )
     return times, ranges
@@ -100,10 +100,10 @@ def _crossings(
         low, high = np.where(ahead >= 0, t, low), np.where(ahead <= 0, t, high)
         slope = (path * acceleration).sum(axis=1) - (velocity**2).sum(axis=1)
         with np.errstate(divide="ignore", invalid="ignore"):
-            moved = t - ahead / slope
-        moved = np.where((moved >= low) & (moved <= high), moved, (low + high) / 2)
-        step = np.abs(moved - t)
-        t = moved
+            new_t = t - ahead / slope
+        new_t = np.where((new_t >= low) & (new_t <= high), new_t, (low + high) / 2)
+        step = np.abs(new_t - t)
+        t = new_t
         if (step <= EXACT + 4 * np.spacing(np.abs(t))).all():
             break
     return np.asarray(np.clip(t, least, most))
@@ -126,9 +126,9 @@ def geolocate(
     """
     speed = np.linalg.norm(velocities, axis=1)
     if (speed < LEAST_SPEED).any():
-        at = int(np.argmin(speed))
+        i = int(np.argmin(speed))
         raise ValueError(
-            f"the satellite moves over the ground with {speed[at]:.3g} m/s at point {at}: without a velocity there is "
+            f"the satellite moves over the ground with {speed[i]:.3g} m/s at point {i}: without a velocity there is "
             "no zero-Doppler plane; give an orbit that is not geostationary"
         )
     along = velocities / speed[:, None]
@@ -140,14 +140,14 @@ def geolocate(
     angle = _angle_at(arc, levels)
     if model is not None:
         angle = _angle_on(arc, model, angle, _angle_at(arc, np.full(len(ranges), model.highest)))
-    found = arc.at(angle)
-    behind = hidden(positions, found)
-    if behind.any():
-        at = int(np.argmax(behind))
+    x = arc.at(angle)
+    is_hidden = hidden(positions, x)
+    if is_hidden.any():
+        i = int(np.argmax(is_hidden))
         raise ValueError(
-            f"slant range[{at}] = {ranges[at]:.9g} m meets the ground behind the horizon; give a shorter range"
+            f"slant range[{i}] = {ranges[i]:.9g} m meets the ground behind the horizon; give a shorter range"
         )
-    return found
+    return x
 
 
 class _Arc:
@@ -179,20 +179,20 @@ def _angle_at(arc: _Arc, heights: np.ndarray) -> np.ndarray:
     low, high = np.zeros(len(heights)), np.full(len(heights), np.pi)
     top = wgs84.geodetic(arc.centers)[2]
     if (heights >= top).any():
-        at = int(np.argmax(heights >= top))
-        raise ValueError(f"heights[{at}] = {heights[at]:.9g} m is above the satellite ({top[at]:.9g} m); give metres")
+        i = int(np.argmax(heights >= top))
+        raise ValueError(f"heights[{i}] = {heights[i]:.9g} m is above the satellite ({top[i]:.9g} m); give metres")
     drop = np.abs((arc.centers * arc.down).sum(axis=1))
-    short = wgs84.geodetic(arc.at(low))[2] >= heights
-    if short.any():
-        at = int(np.argmax(short))
-        if arc.ranges[at] > drop[at]:  # through the Earth, and out on its other side
+    is_short = wgs84.geodetic(arc.at(low))[2] >= heights
+    if is_short.any():
+        i = int(np.argmax(is_short))
+        if arc.ranges[i] > drop[i]:  # through the Earth, and out on its other side
             raise ValueError(
-                f"slant range[{at}] = {arc.ranges[at]:.9g} m reaches beyond the Earth; give a shorter range (one "
+                f"slant range[{i}] = {arc.ranges[i]:.9g} m reaches beyond the Earth; give a shorter range (one "
                 "way, in m)"
             )
         raise ValueError(
-            f"slant range[{at}] = {arc.ranges[at]:.9g} m does not reach the ground, which is "
-            f"{top[at] - heights[at]:.9g} m below the satellite; give a longer range (one way, in m), or lower heights"
+            f"slant range[{i}] = {arc.ranges[i]:.9g} m does not reach the ground, which is "
+            f"{top[i] - heights[i]:.9g} m below the satellite; give a longer range (one way, in m), or lower heights"
         )
     distance = np.linalg.norm(arc.centers, axis=1)
     ground = distance - top + heights
@@ -206,11 +206,12 @@ def _angle_at(arc: _Arc, heights: np.ndarray) -> np.ndarray:
         low, high = np.where(excess <= 0, angle, low), np.where(excess >= 0, angle, high)
         slope = (wgs84.up(longitude, latitude) * arc.slope(angle)).sum(axis=1)
         with np.errstate(divide="ignore", invalid="ignore"):
-            moved = angle - excess / slope
-        moved = np.where((moved >= low) & (moved <= high), moved, (low + high) / 2)
-        moved = np.where(np.abs(excess) <= EXCESS, angle, moved)  # straight down the slope is 0, and no step is right
-        step = np.abs(moved - angle)
-        angle = moved
+            new_angle = angle - excess / slope
+        new_angle = np.where((new_angle >= low) & (new_angle <= high), new_angle, (low + high) / 2)
+        # straight down the slope is 0, and no step is right
+        new_angle = np.where(np.abs(excess) <= EXCESS, angle, new_angle)
+        step = np.abs(new_angle - angle)
+        angle = new_angle
         if (step <= 4e-16).all():
             break
     return np.asarray(angle)
@@ -229,22 +230,22 @@ def _angle_on(arc: _Arc, model: ElevationModel, low: np.ndarray, high: np.ndarra
     rows, before = np.arange(len(low)), _clearance(arc, model, low)
     for step in range(1, steps):
         angles = [low[rows] + n / (steps - 1) * (high - low)[rows] for n in (step - 1, step)]
-        now = _clearance(arc.part(rows), model, angles[1])
-        up = (before <= 0) & (now > 0)
-        first[rows[up]], last[rows[up]] = angles[0][up], angles[1][up]
-        rows, before = rows[~up], now[~up]
+        after = _clearance(arc.part(rows), model, angles[1])
+        is_rising = (before <= 0) & (after > 0)
+        first[rows[is_rising]], last[rows[is_rising]] = angles[0][is_rising], angles[1][is_rising]
+        rows, before = rows[~is_rising], after[~is_rising]
     if np.isnan(first).any():
-        at = int(np.argmax(np.isnan(first)))
-        lon, lat, _ = wgs84.geodetic(arc.at(low)[at])
+        i = int(np.argmax(np.isnan(first)))
+        lon, lat, _ = wgs84.geodetic(arc.at(low)[i])
         raise ValueError(
-            f"slant range[{at}] = {arc.ranges[at]:.9g} m meets no terrain of the elevation model: near longitude "
+            f"slant range[{i}] = {arc.ranges[i]:.9g} m meets no terrain of the elevation model: near longitude "
             f"{lon:.4f}, latitude {lat:.4f} it ends or has no data; give a model that covers "
             "the swath, times and ranges within it (of an image: times=, ranges=), or a number"
         )
     for _ in range(60):
         middle = (first + last) / 2
-        above = _clearance(arc, model, middle) > 0
-        first, last = np.where(above, first, middle), np.where(above, middle, last)
+        is_above = _clearance(arc, model, middle) > 0
+        first, last = np.where(is_above, first, middle), np.where(is_above, middle, last)
         if (last - first <= 4e-16).all():
             break
     return np.asarray(last)
@@ -265,11 +266,11 @@ def ray_ends(positions: NDArray[np.float64], directions: NDArray[np.float64], he
     start, ray = positions / axes, directions / axes
     a, b, c = (ray**2).sum(axis=1), (ray * start).sum(axis=1), (start**2).sum(axis=1) - 1
     disc = b**2 - a * c
-    over = (disc < 0) | (c <= 0) | (b >= 0)
-    if over.any():
+    beyond = (disc < 0) | (c <= 0) | (b >= 0)
+    if beyond.any():
         raise ValueError(
-            f"the beam passes over the horizon in direction {int(np.argmax(over))} of {len(over)}; give a smaller look "
-            "angle, or a narrower beam"
+            f"the beam passes over the horizon in direction {int(np.argmax(beyond))} of {len(beyond)}; give a smaller "
+            "look angle, or a narrower beam"
         )
     along = c / (-b + np.sqrt(disc))
     for _ in range(20):  # surfaces of constant height are nearly, but not exactly, ellipsoids

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..base import validation
 
 TERMS = 256  # cosines per axis: the kurtosis of the process is 3 - 3/(2 TERMS)
 
 
-def deviation(name: str, value: Any) -> np.ndarray:
+def deviation(name: str, value: ArrayLike) -> np.ndarray:
     """Standard deviations (3,) from one number or one per axis; ValueError for a negative one."""
     if validation.ndim(name, value) == 0:
         value = np.full(3, validation.number(name, value))
@@ -22,7 +22,7 @@ def deviation(name: str, value: Any) -> np.ndarray:
     return out
 
 
-def frequencies(correlation_time: Any, spectrum: Any, seed: int) -> np.ndarray:
+def frequencies(correlation_time: float | None, spectrum: tuple[ArrayLike, ArrayLike] | None, seed: int) -> np.ndarray:
     """Frequencies (3, TERMS), Hz, drawn from a spectrum: one from each of TERMS parts of equal power."""
     if (correlation_time is None) == (spectrum is None):
         raise ValueError(

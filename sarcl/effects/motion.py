@@ -52,11 +52,11 @@ def perturbed(
     validation.instance("track", track, Trajectory)
     seed = validation.count("seed", seed, 0)
     with np.errstate(over="ignore", invalid="ignore"):  # positions that are not finite are refused by their name
-        drawn = frequencies(correlation_time, spectrum, seed)
-        offset, rate = random_process(track.known_times, deviation("rms", rms), drawn, seed, 0)
-        out = _moved(track, offset, rate, frame)
+        hertz = frequencies(correlation_time, spectrum, seed)
+        offset, rate = random_process(track.known_times, deviation("rms", rms), hertz, seed, 0)
+        moved = _move(track, offset, rate, frame)
         angles = deviation("attitude_rms", attitude_rms)
-        return turned(out, random_process(track.known_times, angles, drawn, seed, 1)[0]) if angles.any() else out
+        return turned(moved, random_process(track.known_times, angles, hertz, seed, 1)[0]) if angles.any() else moved
 
 
 def sinusoidal(
@@ -79,7 +79,7 @@ def sinusoidal(
     phase = validation.array("phase", phase, np.float64, (3,))
     with np.errstate(over="ignore", invalid="ignore"):  # positions that are not finite are refused by their name
         angle = rate * track.known_times[:, None] + phase
-        return _moved(track, size * np.sin(angle), size * rate * np.cos(angle), frame)
+        return _move(track, size * np.sin(angle), size * rate * np.cos(angle), frame)
 
 
 def with_positions(raw: PhaseHistory, track: Trajectory, *, receiver: Trajectory | None = None) -> PhaseHistory:
@@ -93,13 +93,13 @@ def with_positions(raw: PhaseHistory, track: Trajectory, *, receiver: Trajectory
     validation.instance("raw", raw, PhaseHistory)
     validation.instance("track", track, Trajectory)
     changes: dict[str, Any] = {}
-    for side, given in (("tx", track), ("rx", receiver)):
-        if given is None:
+    for side, antenna_track in (("tx", track), ("rx", receiver)):
+        if antenna_track is None:
             continue
-        validation.instance("track" if side == "tx" else "receiver", given, Trajectory)
-        row = _pulse_of_row(raw, given)
-        changes[side] = given.positions[row]
-        changes[f"{side}_velocity"] = None if given.velocities is None else given.velocities[row]
+        validation.instance("track" if side == "tx" else "receiver", antenna_track, Trajectory)
+        row = _pulse_of_row(raw, antenna_track)
+        changes[side] = antenna_track.positions[row]
+        changes[f"{side}_velocity"] = None if antenna_track.velocities is None else antenna_track.velocities[row]
     if receiver is None and not track.stop_and_go:
         changes |= at_arrival(track, _pulse_of_row(raw, track), raw.reference_range)
     elif receiver is None:
@@ -170,7 +170,7 @@ def combined(parts: Sequence[PhaseHistory]) -> PhaseHistory:
     first = parts[0]
     total = np.zeros(first.samples.shape, np.result_type(*(p.samples.dtype for p in parts)))
     for i, part in enumerate(parts):
-        _same_rows(first, part, i)
+        _check_same_rows(first, part, i)
         shift = (
             2
             / np.longdouble(constants.SPEED_OF_LIGHT)
@@ -180,14 +180,14 @@ def combined(parts: Sequence[PhaseHistory]) -> PhaseHistory:
             rows = slice(start, min(start + 256, first.n_rows))
             block = part.read(rows.start, rows.stop)
             if shift.any():
-                _stays(block, np.asarray(shift[rows] * part.frequency_step[rows], np.float64), i, start)
+                _check_window(block, np.asarray(shift[rows] * part.frequency_step[rows], np.float64), i, start)
                 f = part.frequency[rows, None] + part.frequency_step[rows, None] * np.arange(part.n_samples)
                 block = block * np.exp(-2j * np.pi * ((f * shift[rows, None]) % 1).astype(np.float64))
             total[rows] += block
     return replace(first, samples=validation.sealed(total), report=None)
 
 
-def _same_rows(first: PhaseHistory, part: PhaseHistory, i: int) -> None:
+def _check_same_rows(first: PhaseHistory, part: PhaseHistory, i: int) -> None:
     if part.samples.shape != first.samples.shape:
         raise ValueError(
             f"part {i} has samples {part.samples.shape}, part 0 {first.samples.shape}; make both with the same track "
@@ -199,15 +199,15 @@ def _same_rows(first: PhaseHistory, part: PhaseHistory, i: int) -> None:
             raise ValueError(f"part {i} and part 0 differ in {name}; make both with the same waveform and range_window")
 
 
-def _stays(block: np.ndarray, shift: np.ndarray, i: int, start: int) -> None:
+def _check_window(block: np.ndarray, shift: np.ndarray, i: int, start: int) -> None:
     """Raise ValueError where echoes of a row, shifted by `shift` periods, would wrap to the window's other end."""
     n = block.shape[1]
     power = np.abs(np.fft.ifft(block, axis=1)) ** 2
-    place = np.fft.fftfreq(n) + shift[:, None]
+    delay = np.fft.fftfreq(n) + shift[:, None]
     # an echo within half a sample of a limit may lie at either end
-    lost = (power * (np.abs(place) > 0.5 + 1 / n)).sum(axis=1) > WRAPPED * power.sum(axis=1)
-    if lost.any():
-        row = start + int(np.argmax(lost))
+    is_lost = (power * (np.abs(delay) > 0.5 + 1 / n)).sum(axis=1) > WRAPPED * power.sum(axis=1)
+    if is_lost.any():
+        row = start + int(np.argmax(is_lost))
         raise ValueError(
             f"part {i} lies outside part 0's range window at row {row}; give both echoes a wider range_window, or "
             "leave out the pulses at which it lies outside"
@@ -222,26 +222,26 @@ def _pulse_of_row(raw: PhaseHistory, track: Trajectory) -> np.ndarray:
             f"raw has {raw.n_rows} rows and no times, the track {len(track)} pulses; give one position per row"
         )
     row = np.clip(np.searchsorted(track.known_times, raw.time - 1e-9), 0, len(track) - 1)
-    off = np.abs(track.known_times[row] - raw.time)
-    if (off > 1e-9 * (1 + np.abs(raw.time))).any():
-        bad = int(np.argmax(off))
+    difference = np.abs(track.known_times[row] - raw.time)
+    if (difference > 1e-9 * (1 + np.abs(raw.time))).any():
+        i = int(np.argmax(difference))
         raise ValueError(
-            f"row {bad} was sent at {raw.time[bad]:g} s, where the track has no pulse; give one position per row"
+            f"row {i} was sent at {raw.time[i]:g} s, where the track has no pulse; give one position per row"
         )
     return row
 
 
-def _moved(track: Trajectory, offset: np.ndarray, rate: np.ndarray, frame: str) -> Trajectory:
+def _move(track: Trajectory, offset: np.ndarray, rate: np.ndarray, frame: str) -> Trajectory:
     """The track moved by offsets, m (n, 3), along the axes of the frame; rate  of the offsets, m/s (n, 3)."""
     if validation.choice("frame", frame, FRAMES) == "track":
         along = velocities(track)
-        left = np.cross((0.0, 0.0, 1.0), along)
-        level = np.linalg.norm(left, axis=1, keepdims=True)
-        if not (level > 1e-6 * np.linalg.norm(along, axis=1, keepdims=True)).all():
-            bad = int(np.argmin(level))
-            raise ValueError(f"the track stands still or goes straight up at pulse {bad}; use frame='scene'")
-        along, left = unit(along), left / level
-        axes = np.stack([along, left, np.cross(along, left)], axis=-1)
+        leftward = np.cross((0.0, 0.0, 1.0), along)
+        length = np.linalg.norm(leftward, axis=1, keepdims=True)
+        if not (length > 1e-6 * np.linalg.norm(along, axis=1, keepdims=True)).all():
+            pulse = int(np.argmin(length))
+            raise ValueError(f"the track stands still or goes straight up at pulse {pulse}; use frame='scene'")
+        along, leftward = unit(along), leftward / length
+        axes = np.stack([along, leftward, np.cross(along, leftward)], axis=-1)
         turning = np.gradient(axes, track.known_times, axis=0) if len(track) > 1 else np.zeros_like(axes)
         rate = np.einsum("nij,nj->ni", axes, rate) + np.einsum("nij,nj->ni", turning, offset)
         offset = np.einsum("nij,nj->ni", axes, offset)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,8 +17,8 @@ from ..model.phase_history import PhaseHistory
 from ..model.radar import Radar, noise_variance
 from .noise_level import level_of
 
-MOST_DECIBELS = 300.0  # of noise
-STREAM = 0x6E6F697365  # of random numbers: independent of those of roughness and speckle with the same seed
+MOST_DECIBELS = 300.0  # largest level of noise, dB: amplitudes stay within float32
+STREAM = 0x6E6F697365  # stream of random numbers: independent of those of roughness and speckle with the same seed
 
 
 def add_noise(
@@ -52,14 +51,14 @@ def add_noise(
     """
     instance("raw", raw, PhaseHistory)
     seed = count("seed", seed, 0)
-    given = {"nesz_db": nesz_db, "nesz": nesz, "temperature": temperature, "radar": radar, "variance": variance}
-    if level_of(given) not in ("nesz", "nesz_db") and (grid is not None or cell_area is not None):
-        raise ValueError(f"{level_of(given)} is the level of samples; grid and cell_area go with nesz or nesz_db")
+    levels = {"nesz_db": nesz_db, "nesz": nesz, "temperature": temperature, "radar": radar, "variance": variance}
+    if level_of(levels) not in ("nesz", "nesz_db") and (grid is not None or cell_area is not None):
+        raise ValueError(f"{level_of(levels)} is the level of samples; grid and cell_area go with nesz or nesz_db")
     if nesz is not None and not number("nesz", nesz) > 0:
         raise ValueError(f"nesz is {nesz:g}, wanted a ratio above 0, m^2/m^2; in decibels it is nesz_db={nesz:g}")
     if nesz is not None or nesz_db is not None:
         ratio = number("nesz", nesz, above=0) if nesz is not None else _power(nesz_db)
-        level: Any = ratio * _cells(raw, grid, cell_area) / float((_filtered(raw) ** 2).mean())
+        level: ArrayLike = ratio * _cells(raw, grid, cell_area) / float((_filtered(raw) ** 2).mean())
     elif variance is not None:
         level = number("variance", variance) if ndim("variance", variance) == 0 else variance
     else:
@@ -71,12 +70,12 @@ def add_noise(
     return replace(raw, samples=Noisy(raw.samples, np.sqrt(level), shape, seed))
 
 
-def _power(decibels: Any) -> float:
+def _power(decibels: object) -> float:
     """A power ratio, of dB within those of float32."""
-    given = number("nesz_db", decibels)
-    if abs(given) > MOST_DECIBELS:
-        raise ValueError(f"nesz_db is {given:g}; levels reach from {-MOST_DECIBELS:g} to {MOST_DECIBELS:g} dB")
-    return float(10 ** (given / 10))
+    level = number("nesz_db", decibels)
+    if abs(level) > MOST_DECIBELS:
+        raise ValueError(f"nesz_db is {level:g}; levels reach from {-MOST_DECIBELS:g} to {MOST_DECIBELS:g} dB")
+    return float(10 ** (level / 10))
 
 
 class Noisy(RowsOnDemand):
@@ -86,9 +85,9 @@ class Noisy(RowsOnDemand):
         self.source, self.deviation, self.profile, self.seed = source, deviation, shape, seed
         self.shape, self.dtype = source.shape, np.dtype(source.dtype)
 
-    def rows(self, some: slice) -> np.ndarray:
-        index = np.arange(self.shape[0])[some]
-        clean = np.asarray(self.source[some])
+    def rows(self, rows: slice) -> np.ndarray:
+        index = np.arange(self.shape[0])[rows]
+        clean = np.asarray(self.source[rows])
         noise = complex_gaussian(index, self.shape[1], self.seed) * (self.deviation[index, None] * self.profile)
         return (clean + noise).astype(self.dtype.newbyteorder("="))
 
@@ -108,8 +107,9 @@ def complex_gaussian(rows: np.ndarray, n_samples: int, seed: int) -> np.ndarray:
     return np.asarray(radius * np.exp(2j * np.pi * ((second >> np.uint64(11)).astype(np.float64) * 2.0**-53)))
 
 
-def _kelvin(radar: Any) -> float:
+def _kelvin(radar: Radar | None) -> float:
     instance("radar", radar, Radar)
+    assert radar is not None
     if radar.noise_temperature is None:
         raise ValueError("radar has no noise_temperature; give Radar(..., noise_temperature=...) in K")
     return float(radar.noise_temperature)

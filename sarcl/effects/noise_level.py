@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 LEVELS = ("nesz_db", "nesz", "temperature", "radar", "variance")
 
 
-def level_of(given: Mapping[str, Any]) -> str:
+def level_of(levels: Mapping[str, object]) -> str:
     """The name of the one level among the arguments of `add_noise`; ValueError where there is none, or several."""
-    named = [name for name in LEVELS if given.get(name) is not None]
-    if len(named) != 1:
-        raise ValueError(f"noise has one level; give one of {', '.join(LEVELS)}, got {', '.join(named) or 'none'}")
-    return named[0]
+    names = [name for name in LEVELS if levels.get(name) is not None]
+    if len(names) != 1:
+        raise ValueError(f"noise has one level; give one of {', '.join(LEVELS)}, got {', '.join(names) or 'none'}")
+    return names[0]

@@ -14,7 +14,7 @@ from ..model.trajectory import Trajectory
 from ..model.waveform import Waveform
 
 ITERATIONS = 60  # half the change after each: 1e-18 of the first remains
-ROUNDING = 1e-14  # of coordinates and delays: smaller changes are rounding, which iterations need not reduce
+ROUNDING = 1e-14  # relative change of coordinates and delays that is rounding, which iterations need not reduce
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,10 +72,10 @@ def stop_and_go_error(
     x = validation.array("points", points, np.float64, ("n", 3))
     moving = track if receiver is None else receiver
     tau, slope = _delays(track, moving, x)
-    stands = moving if used is None else used
-    if len(stands) != len(track):
-        raise ValueError(f"used has {len(stands)} positions but track has {len(track)}; give one per pulse")
-    path = _distance(track.positions[:, None], x) + _distance(stands.positions[:, None], x)
+    positions_used = moving if used is None else used
+    if len(positions_used) != len(track):
+        raise ValueError(f"used has {len(positions_used)} positions but track has {len(track)}; give one per pulse")
+    path = _distance(track.positions[:, None], x) + _distance(positions_used.positions[:, None], x)
     c, fc, rate = constants.SPEED_OF_LIGHT, waveform.center, waveform.sweep_rate
     flight = (c * tau - path) / 2
     return StopAndGo(
@@ -101,9 +101,9 @@ def receiver_at_arrival(track: Trajectory, point: ArrayLike, *, receiver: Trajec
     x = validation.array("point", point, np.float64, (3,))
     moving = track if receiver is None else receiver
     tau, _ = _delays(track, moving, x[None])
-    at = _Path(moving)
-    when = track.known_times + tau[:, 0]
-    return replace(moving, times=track.known_times, positions=at(when), velocities=at(when, 1))
+    path = _Path(moving)
+    arrivals = track.known_times + tau[:, 0]
+    return replace(moving, times=track.known_times, positions=path(arrivals), velocities=path(arrivals, 1))
 
 
 def pulse_motion(raw: PhaseHistory, point: ArrayLike, *, undo: bool = False) -> PhaseHistory:
@@ -137,11 +137,11 @@ class _Chirped(RowsOnDemand):
         self.center, self.rate = raw.waveform.center, raw.waveform.sweep_rate
         self.shape, self.dtype = raw.samples.shape, np.dtype(raw.samples.dtype)
 
-    def rows(self, some: slice) -> np.ndarray:
-        f = self.first[some, None] + self.step[some, None] * np.arange(self.shape[1])
-        moved = f * self.slope[some, None]
+    def rows(self, rows: slice) -> np.ndarray:
+        f = self.first[rows, None] + self.step[rows, None] * np.arange(self.shape[1])
+        moved = f * self.slope[rows, None]
         phase = np.pi * moved * (2 * (f - self.center) + moved) / self.rate
-        block = np.asarray(self.source[some])
+        block = np.asarray(self.source[rows])
         return (block * np.exp(-1j * self.sign * phase)).astype(self.dtype.newbyteorder("="))
 
 
@@ -171,26 +171,26 @@ class _Path:
 
 def _delays(track: Trajectory, moving: Trajectory, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """tau of c tau = |T(t) - x| + |x - R(t + tau)|, s, and its rate of change with t: (n_pulses, n_points)."""
-    c, at, from_tx = constants.SPEED_OF_LIGHT, _Path(moving), _Path(track)
-    out = _distance(track.positions[:, None], points)
-    start = np.broadcast_to(track.known_times[:, None], out.shape)
-    tau, change = (out + _distance(at(start), points)) / c, np.inf
+    c, path, from_tx = constants.SPEED_OF_LIGHT, _Path(moving), _Path(track)
+    tx_range = _distance(track.positions[:, None], points)
+    sent = np.broadcast_to(track.known_times[:, None], tx_range.shape)
+    tau, change = (tx_range + _distance(path(sent), points)) / c, np.inf
     for _ in range(ITERATIONS):  # each divides the change by c/speed
-        rx = at(start + tau)
-        last, tau = tau, (out + _distance(rx, points)) / c
+        rx = path(sent + tau)
+        last, tau = tau, (tx_range + _distance(rx, points)) / c
         before, change = change, float(np.abs(tau - last).max())
         if change <= 4e-16 * tau.max():
             break
-        rounding = np.spacing(np.abs(start + last).max()) + ROUNDING * (tau.max() + np.abs(rx).max() / c)
+        rounding = np.spacing(np.abs(sent + last).max()) + ROUNDING * (tau.max() + np.abs(rx).max() / c)
         if change > max(before / 2, rounding):
-            raise _too_fast(moving, start + last, at)
+            raise _too_fast(moving, sent + last, path)
     speed = from_tx(track.known_times, 1)[:, None]
-    return tau, _slope(track.positions[:, None] - points, speed, rx - points, at(start + tau, 1))
+    return tau, _slope(track.positions[:, None] - points, speed, rx - points, path(sent + tau, 1))
 
 
-def _too_fast(moving: Trajectory, arrivals: np.ndarray, at: _Path) -> ValueError:
+def _too_fast(moving: Trajectory, arrivals: np.ndarray, path: _Path) -> ValueError:
     """The error of a receiver whose positions change by half as much as light travels, or more."""
-    speed = float(np.linalg.norm(at(arrivals, 1), axis=-1).max())
+    speed = float(np.linalg.norm(path(arrivals, 1), axis=-1).max())
     return ValueError(
         f"the receiver would move at {speed:.3g} m/s when echoes arrive, at up to {arrivals.max():.6g} s: its track of "
         f"{len(moving)} pulses ends at {moving.known_times[-1]:.6g} s, and is continued by a polynomial from there. "

@@ -9,7 +9,7 @@ For other folders:
 
 For this folder alone:
 
-    _axes      frame, ticks, title and caption of a grey image
+    _axes      frame, ticks, title and caption of a picture; frames of curves
 """
 
 __all__ = ["cut_plot", "decibels", "html", "plots"]

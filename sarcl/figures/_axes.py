@@ -3,28 +3,40 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
 WHITE, INK, FAINT = (255, 255, 255), (38, 38, 38), (226, 226, 226)
+CURVE_WIDTH, CURVE_HEIGHT = 960, 540  # pixels of a frame of curves
+FINE = 4  # times finer than the frame, in which curves are drawn, for smooth edges
+HEADROOM = -0.04  # ratio of the highest level, dB above the peak, to the lowest one
+
+
+class Axis(NamedTuple):
+    """An axis of a frame: its label, the values at its ends, and the least step of its ticks."""
+
+    label: str
+    low: float
+    high: float
+    least_step: float = 0.0
 
 
 class Axes:
     """White background with a frame of (width, height) pixels for the data, axes, a title above and a caption below.
 
-    across, up   (label, value at the low edge, value at the high edge, least tick step) of the two axes
+    across, up   the two axes
     side         space right of the frame, in units of the font size
     """
 
     def __init__(
-        self, width: int, height: int, across: Any, up: Any, title: str | None, side: float, caption: str
+        self, width: int, height: int, across: Axis, up: Axis, title: str | None, side: float, caption: str
     ) -> None:
         from PIL import Image, ImageDraw, ImageFont
 
         self.unit = u = int(np.clip(round(max(width, height) / 40), 15, 40))
         self.line, self.tick = max(1, round(u / 14)), round(u * 0.4)
-        self.font: Any = ImageFont.load_default(u)
+        self.font = ImageFont.load_default(u)
         self.across, self.up = across, up
         self.across_ticks = self._ticks(across, width, across=True)
         self.up_ticks = self._ticks(up, height, across=False)
@@ -32,7 +44,7 @@ class Axes:
         left = round(2 * self.tick + widest + 2.2 * u)
         top = round(2.6 * u if title else 1.2 * u)
         self.frame = (left, top, left + width, top + height)
-        small: Any = ImageFont.load_default(round(0.85 * u))
+        small = ImageFont.load_default(round(0.85 * u))
         room_below: float = width + round(side * u) + left - u
         lines = wrapped(caption, room_below, small.getlength)
         below = top + height + round(3.9 * u)
@@ -47,14 +59,14 @@ class Axes:
             # The font that comes with Pillow has one dash.
             title = " ".join(str(title).split()).translate(dict.fromkeys(map(ord, "‐‑‒–—−"), "-"))
             room = size[0] - left - 0.5 * u
-            font: Any = ImageFont.load_default(round(1.2 * u))
+            font = ImageFont.load_default(round(1.2 * u))
             if font.getlength(title) > room:
                 font = self.font
             while font.getlength(title) > room:
                 title = title[:-2].rstrip() + "…"
             self.draw.text((left, top - round(0.75 * u)), title, INK, font, anchor="ls")
 
-    def _ticks(self, axis: Any, length: int, across: bool) -> tuple[float, list[float]]:
+    def _ticks(self, axis: Axis, length: int, across: bool) -> tuple[float, list[float]]:
         """(step, values) of an axis `length` pixels long, as many as its labels leave room for."""
         _, low, high, least = axis
         most = max(length / (4.2 * self.unit), 5.0)
@@ -87,17 +99,41 @@ class Axes:
             draw.line([(left - self.tick, y), (left - line - 1, y)], fill=INK, width=line)
             draw.text((left - 1.7 * self.tick, y), number(t, step), INK, self.font, anchor="rm")
         self.box(self.frame)
-        turned = Image.new("L", (int(self.font.getlength(ylabel)) + u, 2 * u))
-        middle = (turned.width / 2, turned.height / 2)
-        ImageDraw.Draw(turned).text(middle, ylabel, 255, self.font, anchor="mm")
-        turned = turned.rotate(90, expand=True)
-        self.image.paste(INK, (round(0.2 * u), (top + bottom - turned.height) // 2), turned)
+        label = Image.new("L", (int(self.font.getlength(ylabel)) + u, 2 * u))
+        middle = (label.width / 2, label.height / 2)
+        ImageDraw.Draw(label).text(middle, ylabel, 255, self.font, anchor="mm")
+        label = label.rotate(90, expand=True)
+        self.image.paste(INK, (round(0.2 * u), (top + bottom - label.height) // 2), label)
 
     def box(self, frame: tuple[int, int, int, int]) -> None:
         """A thin frame just outside `frame`, so that it covers no data."""
         w = self.line
         left, top, right, bottom = frame
         self.draw.rectangle((left - w, top - w, right + w - 1, bottom + w - 1), outline=INK, width=w)
+
+
+class CurveAxes(Axes):
+    """A frame of curves from floor_db to a little above 0 dB, relative to what `reference` names."""
+
+    def __init__(self, across: Axis, reference: str, floor_db: float, title: str | None, caption: str) -> None:
+        up = Axis(f"relative to {reference} (dB)", floor_db, HEADROOM * floor_db)
+        super().__init__(CURVE_WIDTH, CURVE_HEIGHT, across, up, title, 1.5, caption)
+        self.axes(grid=True)
+
+    def curve(self, fraction: np.ndarray, db: np.ndarray, colour: tuple[int, int, int], has_dots: bool = False) -> None:
+        """A curve of levels, dB (n,), at fractions of the width (n,); has_dots: with a dot at each."""
+        from PIL import Image, ImageDraw
+
+        _, low, high, _ = self.up
+        x = fraction * CURVE_WIDTH * FINE
+        y = (high - np.clip(db, 2 * low, 2 * high)) / (high - low) * CURVE_HEIGHT * FINE
+        canvas = Image.new("L", (CURVE_WIDTH * FINE, CURVE_HEIGHT * FINE))
+        draw = ImageDraw.Draw(canvas)
+        points = list(zip(x.tolist(), y.tolist(), strict=True))
+        draw.line(points, fill=255, width=9, joint="curve")
+        for px, py in points if has_dots else ():
+            draw.ellipse((px - 14, py - 14, px + 14, py + 14), fill=255)
+        self.image.paste(colour, self.frame[:2], canvas.reduce(FINE))
 
 
 def wrapped(text: str, room: float, length: Callable[[str], float]) -> list[str]:
@@ -113,13 +149,17 @@ def wrapped(text: str, room: float, length: Callable[[str], float]) -> list[str]
 
 
 def image_axis(
-    n: int, along: int, spacing: Any, origin: Any = (0.0, 0.0), names: Any = ("y", "x")
-) -> tuple[str, float, float, float]:
-    """(label, value at the low edge, value at the high edge, least tick step) of axis `along`."""
+    n: int,
+    along: int,
+    spacing: tuple[float, float] | None,
+    origin: tuple[float, float] = (0.0, 0.0),
+    names: tuple[str, str] = ("y", "x"),
+) -> Axis:
+    """The axis `along` of an image of n pixels: 0 of its rows, 1 of its columns."""
     if spacing is None:
-        return ("row", "column")[along], -0.5, n - 0.5, 1.0
+        return Axis(("row", "column")[along], -0.5, n - 0.5, 1.0)
     low = origin[along] + (-(n // 2) - 0.5) * spacing[along]
-    return f"{names[along]} (m)", low, low + n * spacing[along], 0.0
+    return Axis(f"{names[along]} (m)", low, low + n * spacing[along])
 
 
 def ticks_between(low: float, high: float, most: float, least: float = 0.0) -> tuple[float, list[float]]:

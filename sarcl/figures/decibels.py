@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 
 from ..base import validation
 from ..base.version import __version__
-from ._axes import INK, Axes, image_axis, number, ticks_between
+from ._axes import CURVE_WIDTH, INK, Axes, CurveAxes, image_axis, number, ticks_between
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
     from PIL.Image import Image as Picture
+
+    from ..base.types import PathLike
 
 SMALLEST, LARGEST = 500, 2400  # pixels along the longer side of what is drawn
 THINNEST = 1 / 6  # smallest ratio of shorter to longer side; a longer strip is stretched across
-CURVE = (22, 82, 148)
+CURVE = (22, 82, 148)  # colour of a line plot
+LINE_SAMPLES = 10  # samples per pixel of a line plot, at most: more are averaged
+MOST_DOTS = 64  # samples of a line plot that are shown as dots too
 PNG_NOISE, PNG_AXES = 2.2, 6e4  # bytes per pixel of noise, and of axes, caption and scale
-MOST_DECIBELS = 1e4  # of levels: float64 holds powers from -3200 to 3100 dB
+MOST_DECIBELS = 1e4  # largest level, dB: float64 holds powers from -3200 to 3100 dB
 PERCENTILE = 99.5  # default of white: one in 200 pixels of the scene is clipped
 # Levels that tell a scene from an object in front of nothing, dB. FILLED: largest difference of percentile 99.5 and the
 # median in a scene. It is 9 dB for speckle and about 20 with shadows, but over 40 for the side lobes of a lone point.
@@ -25,9 +30,30 @@ PERCENTILE = 99.5  # default of white: one in 200 pixels of the scene is clipped
 FILLED, FAINTEST, OBJECT = 25.0, 40.0, 30.0
 
 
+class _Scale(NamedTuple):
+    """Levels of black and white, as `picture` takes them."""
+
+    floor_db: float
+    top_db: float | None
+    percentile: float | None
+
+    @property
+    def percentile_text(self) -> str:
+        value = PERCENTILE if self.percentile is None else self.percentile
+        return "the brightest pixel" if value == 100 else f"percentile {value:g} of the scene"
+
+
+class _PixelAxes(NamedTuple):
+    """Spacing of the pixels, or None, coordinates of the middle one and their names, as `picture` takes them."""
+
+    spacing: tuple[float, float] | None
+    origin: tuple[float, float]
+    names: tuple[str, str]
+
+
 def picture(
-    db: Any,
-    spacing: Any = None,
+    db: ArrayLike,
+    spacing: float | tuple[float, float] | None = None,
     floor_db: float = -50.0,
     title: str | None = None,
     *,
@@ -63,14 +89,14 @@ def picture(
     if db.dtype.kind not in "fiu":
         raise ValueError(f"db has type {db.dtype}, wanted real decibels: 20 log10 of a modulus")
     if not (db < np.inf).all():
-        at = np.unravel_index(int(np.argmin(db < np.inf)), db.shape)
-        raise ValueError(f"db[{at[0]}, {at[1]}] is {db[at]}; decibels are finite, or -inf for no signal")
+        index = np.unravel_index(int(np.argmin(db < np.inf)), db.shape)
+        raise ValueError(f"db[{index[0]}, {index[1]}] is {db[index]}; decibels are finite, or -inf for no signal")
     check_scale(floor_db, top_db, percentile)
     if spacing is not None:
-        dy, dx = spacing if np.ndim(spacing) else (spacing, spacing)
+        dy, dx = cast(tuple[float, float], spacing if np.ndim(spacing) else (spacing, spacing))
         spacing = validation.number("spacing[0]", dy, above=0), validation.number("spacing[1]", dx, above=0)
     draw = _line_plot if 1 in db.shape and db.size > 1 else _grey_image
-    return draw(db, (spacing, origin, names), floor_db, top_db, percentile, title, zero)
+    return draw(db, _PixelAxes(spacing, origin, names), _Scale(floor_db, top_db, percentile), title, zero)
 
 
 def check_scale(
@@ -107,14 +133,14 @@ def white_level(db: np.ndarray, percentile: float | None = None) -> float:
     signal = db[db > -np.inf]
     if not signal.size:
         return -np.inf
-    wanted, peak = PERCENTILE if percentile is None else percentile, signal.max()
-    middle, high, white = np.percentile(signal, (50, PERCENTILE, wanted), method="higher")
+    share, peak = PERCENTILE if percentile is None else percentile, signal.max()
+    middle, high, white = np.percentile(signal, (50, PERCENTILE, share), method="higher")
     if middle < high - FILLED or high < peak - FAINTEST:
-        white = np.percentile(signal[signal >= peak - OBJECT], wanted, method="higher")
+        white = np.percentile(signal[signal >= peak - OBJECT], share, method="higher")
     return float(white)
 
 
-def write_png(picture: Picture, path: Any) -> None:
+def write_png(picture: Picture, path: PathLike) -> None:
     """Write a PNG that appears whole or not at all; raises what `output_paths.check_writable` raises, and
     FileExistsError while another run writes the same path.
 
@@ -149,10 +175,10 @@ def drawn_shape(shape: tuple[int, int], spacing: tuple[float, float] | None) -> 
     return _whole(shape[0], n[0]), _whole(shape[1], n[1])
 
 
-def _whole(old: int, wanted: float) -> int:
+def _whole(n_old: int, n_new: float) -> int:
     """`wanted` pixels for `old`, changed by up to 1 % where that makes the factor between them whole."""
-    near = old * round(wanted / old) if wanted >= old else -(-old // round(old / wanted))
-    return near if abs(near - wanted) <= 0.01 * wanted + 1 else round(wanted)
+    multiple = n_old * round(n_new / n_old) if n_new >= n_old else -(-n_old // round(n_old / n_new))
+    return multiple if abs(multiple - n_new) <= 0.01 * n_new + 1 else round(n_new)
 
 
 def resampled(db: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
@@ -190,38 +216,36 @@ def _average_power(db: np.ndarray, top: float, shape: tuple[int, int]) -> np.nda
 
 def _means(power: np.ndarray, n: int) -> np.ndarray:
     """Means over n pieces of the last axis; a sample on a border counts in both pieces by its share."""
-    old = power.shape[-1]
-    k = -(-old // n)
-    edge = np.arange(n + 1) * (old / n)
-    if old > n and k * n - old <= 0.01 * old:
+    n_old = power.shape[-1]
+    k = -(-n_old // n)
+    edge = np.arange(n + 1) * (n_old / n)
+    if n_old > n and k * n - n_old <= 0.01 * n_old:
         # Whole blocks, the last one short: shares would smooth speckle here more than there.
-        edge = np.minimum(np.arange(n + 1) * k, old)
-    whole = np.minimum(edge.astype(int), old - 1)
-    total = np.zeros((*power.shape[:-1], old + 1))
+        edge = np.minimum(np.arange(n + 1) * k, n_old)
+    first = np.minimum(edge.astype(int), n_old - 1)
+    total = np.zeros((*power.shape[:-1], n_old + 1))
     np.cumsum(power, axis=-1, out=total[..., 1:])
     # Differences of sums can round to just below zero.
-    sums = np.maximum(np.diff(total[..., whole] + (edge - whole) * power[..., whole]), 0)
+    sums = np.maximum(np.diff(total[..., first] + (edge - first) * power[..., first]), 0)
     return sums / np.diff(edge)
 
 
-def _grey_image(
-    db: np.ndarray, axes: tuple[Any, Any, Any], floor_db: float, top_db: float | None, percentile: float | None,
-    title: str | None, zero: str | None,
-) -> Picture:  # fmt: skip
+def _grey_image(db: np.ndarray, axes: _PixelAxes, scale: _Scale, title: str | None, zero: str | None) -> Picture:
     from PIL import Image
 
-    height, width = drawn_shape(db.shape, axes[0])
+    height, width = drawn_shape((db.shape[0], db.shape[1]), axes.spacing)
     across, up = image_axis(db.shape[1], 1, *axes), image_axis(db.shape[0], 0, *axes)
-    ratio = (up[2] - up[1]) / (across[2] - across[1])
+    ratio = (up.high - up.low) / (across.high - across.low)
     if ratio < THINNEST:
-        up = (up[0] + ", stretched", *up[1:])
+        up = up._replace(label=f"{up.label}, stretched")
     elif 1 / ratio < THINNEST:
-        across = (across[0] + ", stretched", *across[1:])
+        across = across._replace(label=f"{across.label}, stretched")
     drawn = resampled(db, (height, width))
+    floor_db, top_db, percentile = scale
     white = white_level(drawn, percentile) if top_db is None else float(top_db)
-    how = "given" if top_db is not None else _percentile_text(percentile)
+    origin = scale.percentile_text if top_db is None else "given"
     levels = grey_levels(drawn, white, floor_db, (height, width))
-    caption = _caption(white, how, float(drawn.max()), floor_db, zero)
+    caption = _caption(white, origin, float(drawn.max()), floor_db, zero)
     drawing = Axes(width, height, across, up, title, 7.0, caption)
     left, top, right, bottom = drawing.frame
     drawing.image.paste(Image.fromarray(levels), (left, top))
@@ -243,59 +267,37 @@ def _grey_image(
     return drawing.image
 
 
-def _percentile_text(percentile: float | None) -> str:
-    value = PERCENTILE if percentile is None else percentile
-    return "the brightest pixel" if value == 100 else f"percentile {value:g} of the scene"
-
-
-def _caption(white: float, how: str, peak: float, floor_db: float, zero: str | None) -> str:
-    """What white, black and 0 dB are, in words."""
+def _caption(white: float, origin: str, peak: float, floor_db: float, zero: str | None) -> str:
+    """Words for white, black and 0 dB; origin  of the level of white."""
     if peak == -np.inf:
         return "No pixel has a signal."
     above = peak - white
     clipped = f"; the brightest pixel is {above:.1f} dB above" if above >= 0.05 else ""
     unit = f" 0 dB: {zero}." if zero else ""
-    return f"White: {_decibels(white)} ({how}{clipped}). Black: {_decibels(white + floor_db)}.{unit}"
+    return f"White: {_decibels(white)} ({origin}{clipped}). Black: {_decibels(white + floor_db)}.{unit}"
 
 
 def _decibels(value: float) -> str:
     return f"{round(value, 1) + 0.0:.1f} dB"
 
 
-def _line_plot(
-    db: np.ndarray, axes: tuple[Any, Any, Any], floor_db: float, top_db: float | None, percentile: float | None,
-    title: str | None, zero: str | None,
-) -> Picture:  # fmt: skip
-    from PIL import Image, ImageDraw
-
+def _line_plot(db: np.ndarray, axes: _PixelAxes, scale: _Scale, title: str | None, zero: str | None) -> Picture:
+    floor_db, top_db, _ = scale
     along = int(db.shape[0] > 1)  # 1: one column, drawn along its rows
-    axis = image_axis(db.size, 1 - along, *axes)
-    width, height, fine = 960, 540, 4  # the curve is drawn four times finer, for a smooth edge
+    most = LINE_SAMPLES * CURVE_WIDTH
     values = db.ravel()[None, :]
-    if values.shape[1] > 10 * width:
+    if values.shape[1] > most:
         with np.errstate(divide="ignore"):
             highest = max(float(values.max()), -1e300)
-            values = highest + 10 * np.log10(_average_power(values, highest, (1, 10 * width)))
+            values = highest + 10 * np.log10(_average_power(values, highest, (1, most)))
     peak = float(values.max())
-    white, name = (peak, "the maximum") if top_db is None else (float(top_db), _decibels(top_db))
+    white, reference = (peak, "the maximum") if top_db is None else (float(top_db), _decibels(top_db))
     caption = "No sample has a signal." if peak == -np.inf else f"Maximum: {_decibels(peak)}."
     if zero and peak > -np.inf:
         caption += f" 0 dB: {zero}."
-    up = (f"relative to {name} (dB)", floor_db, -0.04 * floor_db, 0.0)
-    drawing = Axes(width, height, axis, up, title, 1.5, caption)
-    drawing.axes(grid=True)
-    relative = np.full(values.size, 2 * floor_db) if peak == -np.inf else values[0] - white
-    n = len(relative)
-    x = (np.arange(n) + 0.5) / n * width * fine
-    low, high = floor_db, -0.04 * floor_db
-    y = (high - np.clip(relative, 2 * floor_db, 2 * high)) / (high - low) * height * fine
-    curve = Image.new("L", (width * fine, height * fine))
-    draw = ImageDraw.Draw(curve)
-    points = list(zip(x.tolist(), y.tolist(), strict=True))
-    draw.line(points, fill=255, width=9, joint="curve")
-    if n <= 64:  # few enough to show each
-        for px, py in points:
-            draw.ellipse((px - 14, py - 14, px + 14, py + 14), fill=255)
-    drawing.image.paste(CURVE, drawing.frame[:2], curve.reduce(fine))
+    drawing = CurveAxes(image_axis(db.size, 1 - along, *axes), reference, floor_db, title, caption)
+    n = values.size
+    relative = np.full(n, 2 * floor_db) if peak == -np.inf else values[0] - white
+    drawing.curve((np.arange(n) + 0.5) / n, relative, CURVE, has_dots=n <= MOST_DOTS)
     drawing.image.info |= {"top_db": white, "floor_db": float(floor_db)}
     return drawing.image

@@ -8,9 +8,10 @@ from __future__ import annotations
 from base64 import b64encode
 from collections.abc import Collection, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..base.version import __version__
 from . import plots
@@ -24,9 +25,9 @@ def page(title: str, blocks: Sequence[Block], command: str = "") -> str:
 
     source = Path(__file__).with_name("page.html.j2").read_text(encoding="utf-8")
     template = Environment(autoescape=True, undefined=StrictUndefined).from_string(source)
-    given = {"title": title, "blocks": blocks, "command": command, "version": __version__}
-    size = len(template.render(**given, megabytes="0.0").encode())
-    return template.render(**given, megabytes=f"{size / 1e6:.1f}" if size > 5e4 else f"{size / 1e6:.2f}")
+    contents = {"title": title, "blocks": blocks, "command": command, "version": __version__}
+    size = len(template.render(**contents, megabytes="0.0").encode())
+    return template.render(**contents, megabytes=f"{size / 1e6:.1f}" if size > 5e4 else f"{size / 1e6:.2f}")
 
 
 def heading(text: str, level: int = 2, anchor: str = "") -> Block:
@@ -50,17 +51,26 @@ def terms(pairs: Sequence[tuple[str, str]]) -> Block:
 
 
 def table(
-    head: Sequence[str], rows: Sequence[Sequence[Any]], caption: str = "", *, text: bool = False,
+    head: Sequence[str],
+    rows: Sequence[Sequence[Any]],
+    caption: str = "",
+    *,
+    text: bool = False,
     marked: Collection[int] = (),
-) -> Block:  # fmt: skip
+) -> Block:
     """Rows of numbers under their heads; text: rows of words, aligned left; marked: indices of rows to be shaded."""
     return {"kind": "table", "head": head, "rows": rows, "caption": caption, "text": text, "marked": marked}
 
 
 def plot(
-    curves: Sequence[tuple[str, Any, Any]], x_name: str, y_name: str, caption: str, *,
-    dots: bool | Sequence[str] = False, log_x: bool = False,
-) -> Block:  # fmt: skip
+    curves: Sequence[plots.Curve],
+    x_name: str,
+    y_name: str,
+    caption: str,
+    *,
+    dots: bool | Sequence[str] = False,
+    log_x: bool = False,
+) -> Block:
     """A figure of curves or dots; see `plots.curves`."""
     names = ", ".join(name for name, _, _ in curves)
     data = plots.curves(curves, x_name, y_name, dots=dots, log_x=log_x)
@@ -68,31 +78,27 @@ def plot(
 
 
 def picture(
-    db: Any, x: tuple[float, float], y: tuple[float, float], x_name: str, y_name: str, caption: str, *,
-    floor_db: float = -40.0, box: tuple[float, float] | None = None, percentile: float = 100.0,
-    lines: Sequence[tuple[str, Any, Any]] = (), unit: str = "dB", equal: bool = False,
-) -> Block:  # fmt: skip
+    db: ArrayLike,
+    x: tuple[float, float],
+    y: tuple[float, float],
+    x_name: str,
+    y_name: str,
+    caption: str,
+    *,
+    percentile: float = 100.0,
+    **look: Unpack[plots.PictureLook],
+) -> Block:
     """A figure of decibels in grey, or of values of another unit; see `plots.picture`.
 
     percentile  of the values at which the scale has white
     """
     db = np.asarray(db, np.float64)
-    data = plots.picture(
-        np.minimum(db, np.percentile(db, percentile)),
-        x,
-        y,
-        x_name,
-        y_name,
-        floor_db=floor_db,
-        box=box,
-        lines=lines,
-        unit=unit,
-        equal=equal,
-    )
+    top = float(np.percentile(db, percentile))
+    data = plots.picture(np.minimum(db, top), plots.PlotAxis(x_name, *x), plots.PlotAxis(y_name, *y), **look)
+    floor_db, unit = look.get("floor_db", plots.FLOOR_DB), look.get("unit", "dB")
     white = "the largest value" if percentile == 100 else f"the percentile {percentile:g} of the values"
     scale = f"White: {white}; black: {-floor_db:g} dB below."
     if not unit.startswith("dB"):
-        top = float(np.percentile(db, percentile))
         scale = f"White: {top:.2g}; black: {top + floor_db:.2g} {unit}."
     return _figure(data, f"{caption} {scale}", f"Levels over {x_name} and {y_name}")
 

@@ -7,24 +7,41 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from io import BytesIO
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, TypedDict, cast
 
 import numpy as np
+from numpy.typing import ArrayLike
+
+from ._axes import Axis as PlotAxis
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-SIZE, DPI = (5.6, 4.0), 120  # of a figure, inches; pixels per inch
-LEFT, BOTTOM, WIDTH, HEIGHT = 0.14, 0.13, 0.83, 0.83  # of the axes, relative to the figure
-GREY_WIDTH = 0.76  # of a picture with its scale, relative to the figure
-SCALE_SHARE, SCALE_GAP = 0.11, 0.03  # of it: scale and gap together, and the gap alone
-LOWEST, HIGHEST = 2.4, 5.4  # of a picture whose axes have equal units, inches
+FLOOR_DB = -40.0  # dB, black below white
+SIZE, DPI = (5.6, 4.0), 120  # size of a figure, inches; pixels per inch
+LEFT, BOTTOM, WIDTH, HEIGHT = 0.14, 0.13, 0.83, 0.83  # place of the axes, relative to the figure
+GREY_WIDTH = 0.76  # width of a picture with its scale, relative to the figure
+SCALE_SHARE, SCALE_GAP = 0.11, 0.03  # widths over that one: scale and gap together, and the gap alone
+LOWEST, HIGHEST = 2.4, 5.4  # heights of a picture whose axes have equal units, inches
 LEGEND_LINE = 0.055  # height of a line of the legend above the axes, relative to the figure
 COLORS = ("#1f4e9c", "#c0392b", "#1d8348", "#8e44ad", "#b9770e", "#34495e")
 LINES: tuple[Any, ...] = ("-", "--", "-.", ":", (0, (7, 2)), (0, (4, 1, 1, 1, 1, 1)))
 MARKERS = ("o", "s", "^", "D", "v", "x")
+Curve = tuple[str, ArrayLike, ArrayLike]  # name, x (n,), y (n,)
 ALL_MARKED = 24  # points; of a longer curve only about eight points are marked
+
+
+class PictureLook(TypedDict, total=False):
+    """Options of `picture`."""
+
+    floor_db: float
+    box: tuple[float, float] | None
+    lines: Sequence[Curve]
+    unit: str
+    equal: bool
 
 
 def require(what: str) -> None:
@@ -41,16 +58,16 @@ def figure(size: tuple[float, float] = SIZE) -> Figure:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    made = Figure(figsize=size, dpi=DPI)
-    FigureCanvasAgg(made)
-    return made
+    empty = Figure(figsize=size, dpi=DPI)
+    FigureCanvasAgg(empty)
+    return empty
 
 
 def png(figure: Figure, colours: int = 64) -> bytes:
     """A figure of `figure` as a PNG file of so many colours, 256 at most."""
     from PIL import Image
 
-    canvas: Any = figure.canvas
+    canvas = cast("FigureCanvasAgg", figure.canvas)
     canvas.draw()
     pixels = Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3])
     file = BytesIO()
@@ -65,30 +82,33 @@ def style(i: int) -> dict[str, Any]:
     """
     k = i % len(COLORS)
     return {
-        "color": COLORS[k], "linestyle": LINES[k], "linewidth": 2.6 - 0.3 * k, "marker": MARKERS[k],
-        "markersize": 9.0 - k, "markerfacecolor": "none",
-    }  # fmt: skip
+        "color": COLORS[k],
+        "linestyle": LINES[k],
+        "linewidth": 2.6 - 0.3 * k,
+        "marker": MARKERS[k],
+        "markersize": 9.0 - k,
+        "markerfacecolor": "none",
+    }
 
 
 def curves(
-    curves: Sequence[tuple[str, Any, Any]], x_name: str, y_name: str, *, dots: bool | Sequence[str] = False,
-    log_x: bool = False,
-) -> bytes:  # fmt: skip
+    curves: Sequence[Curve], x_name: str, y_name: str, *, dots: bool | Sequence[str] = False, log_x: bool = False
+) -> bytes:
     """PNG of curves (name, x (n,), y (n,)) in one frame, with a legend where there are two or more.
 
     dots  True: all are clouds of dots; names: these are dots, and larger;  log_x: x > 0, in decades
     """
-    made = figure()
+    drawing = figure()
     lines = 0 if len(curves) == 1 else -(-len(curves) // 2)
-    axes = made.add_axes((LEFT, BOTTOM, WIDTH, HEIGHT - lines * LEGEND_LINE))
+    axes = drawing.add_axes((LEFT, BOTTOM, WIDTH, HEIGHT - lines * LEGEND_LINE))
     for i, (name, x, y) in enumerate(curves):
         look = style(i)
         if dots is True:
             look |= {"linestyle": "none", "markersize": 2, "markerfacecolor": look["color"], "alpha": 0.6}
         elif dots and name in dots:
             look["linestyle"] = "none"
-        elif len(x) > ALL_MARKED:
-            look["markevery"] = (i * len(x) // 40, len(x) // 8)
+        elif (n := len(np.asarray(x))) > ALL_MARKED:
+            look["markevery"] = (i * n // 40, n // 8)
         axes.plot(np.asarray(x, float), np.asarray(y, float), label=name, **look)
     if log_x:
         axes.set_xscale("log")
@@ -96,7 +116,7 @@ def curves(
     names(axes, x_name, y_name)
     if lines:
         axes.legend(loc="lower left", bbox_to_anchor=(-0.12, 1.0), ncols=2, fontsize=9, frameon=False, handlelength=4)
-    return png(made)
+    return png(drawing)
 
 
 def names(axes: Axes, x_name: str, y_name: str) -> None:
@@ -106,7 +126,7 @@ def names(axes: Axes, x_name: str, y_name: str) -> None:
     axes.grid(alpha=0.3)
 
 
-def decades(axis: Any) -> None:
+def decades(axis: Axis) -> None:
     """Ticks of a logarithmic axis at 1, 2 and 5 times powers of ten, written as numbers."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
@@ -116,13 +136,19 @@ def decades(axis: Any) -> None:
 
 
 def picture(
-    db: Any, x: tuple[float, float], y: tuple[float, float], x_name: str, y_name: str, *, floor_db: float,
-    box: tuple[float, float] | None = None, lines: Sequence[tuple[str, Any, Any]] = (), unit: str = "dB",
+    db: ArrayLike,
+    across: PlotAxis,
+    up: PlotAxis,
+    *,
+    floor_db: float = FLOOR_DB,
+    box: tuple[float, float] | None = None,
+    lines: Sequence[Curve] = (),
+    unit: str = "dB",
     equal: bool = False,
-) -> bytes:  # fmt: skip
+) -> bytes:
     """PNG of decibels (rows, columns) in grey, row 0 at the bottom: white is the largest value, black floor_db below.
 
-    x, y  edges of the frame;  box: half widths along x and y of a dashed rectangle about the origin
+    across, up  edges of the frame;  box: half widths along both of a dashed rectangle about the origin
     lines (name, x (n,), y (n,)) drawn over it, with a legend;  unit  of the values, where they are not decibels
     equal  a unit of x is as long as a unit of y: the figure is as high as its frame needs
     """
@@ -132,23 +158,22 @@ def picture(
     top = float(db.max())
     wide, high = SIZE
     if equal:
-        frame = GREY_WIDTH * (1 - SCALE_SHARE) * wide * abs((y[1] - y[0]) / (x[1] - x[0]))
+        frame = GREY_WIDTH * (1 - SCALE_SHARE) * wide * abs((up.high - up.low) / (across.high - across.low))
         high = float(np.clip(frame + (1 - HEIGHT) * SIZE[1], LOWEST, HIGHEST))
     margin = SIZE[1] / high
-    made = figure((wide, high))
-    axes = made.add_axes((LEFT, BOTTOM * margin, GREY_WIDTH, 1 - (1 - HEIGHT) * margin))
-    shown = axes.imshow(
-        db, cmap="gray", vmin=top + floor_db, vmax=top, origin="lower", extent=(*x, *y),
-        aspect="equal" if equal else "auto",
-    )  # fmt: skip
-    names(axes, x_name, y_name)
+    drawing = figure((wide, high))
+    axes = drawing.add_axes((LEFT, BOTTOM * margin, GREY_WIDTH, 1 - (1 - HEIGHT) * margin))
+    extent = across.low, across.high, up.low, up.high
+    aspect: Literal["equal", "auto"] = "equal" if equal else "auto"
+    image = axes.imshow(db, "gray", vmin=top + floor_db, vmax=top, origin="lower", extent=extent, aspect=aspect)
+    names(axes, across.label, up.label)
     axes.grid(visible=False)
-    made.colorbar(shown, ax=axes, label=unit, fraction=SCALE_SHARE - SCALE_GAP, pad=SCALE_GAP)
+    drawing.colorbar(image, ax=axes, label=unit, fraction=SCALE_SHARE - SCALE_GAP, pad=SCALE_GAP)
     if box is not None:
         corner = -box[0], -box[1]
         axes.add_patch(Rectangle(corner, 2 * box[0], 2 * box[1], fill=False, edgecolor="#2ecc71", linestyle="--"))
-    for i, (name, along, up) in enumerate(lines):
-        axes.plot(along, up, label=name, **(style(i) | {"marker": ""}))
+    for i, (name, x, y) in enumerate(lines):
+        axes.plot(x, y, label=name, **(style(i) | {"marker": ""}))
     if lines:
         axes.legend(loc="lower left", fontsize=9)
-    return png(made, 256)
+    return png(drawing, 256)

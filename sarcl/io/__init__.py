@@ -11,19 +11,19 @@ For other folders:
     output_paths   output files: checked before the computation, written completely or not at all
     sarcl_hdf5     sarcl's own HDF5 file: a phase history or an image, read and written as plain fields
     toml           TOML: line numbers of keys, and values written back as text
-    xml/           XML files of others: bounded in size, and virtual rasters
+    xml/           XML files of others, and virtual rasters
 
 For this folder alone:
 
     _checked_rows  rows of an HDF5 file, whose checksums are compared when they are read
     _checksums     checksums of sarcl's own HDF5 file, behind its end
-    _collada_checks  what a COLLADA file holds that would be left out or covered wrongly in silence: refused
-    _gltf_checks   what a glTF file needs that would be left out in silence: refused
+    _collada_checks  surfaces of COLLADA files that would be left out or covered wrongly in silence: refused
+    _gltf_checks   surfaces of glTF files that would be left out in silence: refused
     _gotcha        AFRL Gotcha volumetric SAR data set, MATLAB 5
-    _hdf5_safety   what an HDF5 file may do to its reader: refused
+    _hdf5_safety   HDF5 files that lead into others, declare too much or never end: refused
     _mat5_checks   the structure of a MATLAB 5 file, walked before scipy reads it
-    _mesh_archive  meshes in archives, unpacked within bounds
-    _mesh_checks   what a mesh file declares, compared with what it holds; polygons and the fans that cover them
+    _mesh_archive  meshes in archives
+    _mesh_checks   faces that a mesh file declares and holds; polygons and the fans that cover them
     _mesh_repair   repairs of meshes: winding, faces that collapse or repeat
     _mesh_text     text of .obj and .off files: as trimesh reads it right, or refused
     _other_files   files that a mesh or an elevation model names: those of its own folder

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NoReturn
 
 import h5py
 import numpy as np
+from numpy.typing import DTypeLike
 
 from ..base import arguments
 from ._checksums import AT_ONCE, Checksums, crc_of
@@ -22,7 +23,7 @@ class CheckedRows(h5py.Dataset):
         self._sums = sums
         self._good = np.zeros(len(sums.blocks), bool)
 
-    def __reduce__(self) -> Any:
+    def __reduce__(self) -> NoReturn:
         """Refused: copy, pickle and multiprocessing cannot hand an open file on."""
         raise TypeError(
             f"the samples or pixels are rows of the open file {self.file.filename!r}, which cannot be copied or sent "
@@ -30,7 +31,7 @@ class CheckedRows(h5py.Dataset):
             "dataclasses.replace(raw, samples=raw.read(0, raw.n_rows))"
         )
 
-    def __getitem__(self, args: Any, new_dtype: Any = None) -> Any:
+    def __getitem__(self, args: Any, new_dtype: DTypeLike | None = None) -> Any:
         if new_dtype is None:
             arguments.checked_index("index", f"samples in {self.file.filename!r}", args, self.shape)
         first = args[0] if isinstance(args, tuple) and args else args
@@ -44,21 +45,23 @@ class CheckedRows(h5py.Dataset):
             if plain and (stop - start) * row <= 2 * AT_ONCE:  # one reading serves the check and the caller
                 rows = self._read(slice(start, stop))
                 self._compare(rows, a)
-                wanted = rows[low - start : high - start]
-                return wanted.copy() if 2 * len(wanted) < len(rows) else wanted  # does not hold much more than asked
+                selection = rows[low - start : high - start]
+                return (
+                    selection.copy() if 2 * len(selection) < len(rows) else selection
+                )  # does not hold much more than asked
             for block in range(a, b):
                 if not self._good[block]:
                     self._compare(self._read(slice(block * step, min((block + 1) * step, self.shape[0]))), block)
         return self._read(args, new_dtype)
 
     def read_direct(self, dest: Any, source_sel: Any = None, dest_sel: Any = None) -> None:
-        """As of h5py.Dataset."""
+        """The method of h5py.Dataset, after the check of all rows."""
         for start in range(0, self.shape[0], self._sums.step):
             if not self._good[block := start // self._sums.step]:
                 self._compare(self._read(slice(start, min(start + self._sums.step, self.shape[0]))), block)
         super().read_direct(dest, source_sel, dest_sel)
 
-    def _touched(self, first: Any) -> tuple[int, int]:
+    def _touched(self, first: object) -> tuple[int, int]:
         """First and last + 1 of the rows that an index of rows may name."""
         n = self.shape[0]
         if isinstance(first, slice):
@@ -68,7 +71,7 @@ class CheckedRows(h5py.Dataset):
             return (int(first) % n, int(first) % n + 1) if -n <= first < n else (0, 0)
         return 0, n
 
-    def _read(self, args: Any, new_dtype: Any = None) -> Any:
+    def _read(self, args: Any, new_dtype: DTypeLike | None = None) -> Any:
         try:
             return super().__getitem__(args, new_dtype)
         except (TypeError, ValueError, IndexError):  # what NumPy reads of an array, but h5py not of a file

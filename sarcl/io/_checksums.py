@@ -16,9 +16,13 @@ import zlib
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
+
+if TYPE_CHECKING:
+    import h5py
+    from numpy.typing import ArrayLike, DTypeLike
 
 MAGIC = b"sarcl checksums 1\n"
 END = 12 + len(MAGIC)  # bytes after the text
@@ -51,7 +55,7 @@ class Checksums:
     blocks: list[int] = field(default_factory=list)
 
 
-def rows_per_block(shape: tuple[int, ...], dtype: Any) -> int:
+def rows_per_block(shape: tuple[int, ...], dtype: DTypeLike) -> int:
     """Rows of a block, so that it has about BLOCK_BYTES."""
     return max(1, BLOCK_BYTES // max(1, int(np.prod(shape[1:], dtype=np.int64)) * np.dtype(dtype).itemsize))
 
@@ -59,34 +63,34 @@ def rows_per_block(shape: tuple[int, ...], dtype: Any) -> int:
 class RunningSums:
     """CRCs of the blocks of rows that are being written, without reading them again where rows come in order."""
 
-    def __init__(self, shape: tuple[int, ...], dtype: Any) -> None:
+    def __init__(self, shape: tuple[int, ...], dtype: DTypeLike) -> None:
         self.shape, self.dtype = shape, np.dtype(dtype)
         self.step = rows_per_block(shape, dtype)
         n = -(-shape[0] // self.step)
         self.sums = np.zeros(n, np.uint32)
         self._rows = np.zeros(n, np.int64)  # of each block, those that its CRC covers; -1: written in another order
 
-    def wrote(self, at: Any, values: Any) -> None:
+    def wrote(self, index: object, values: ArrayLike) -> None:
         """Rows `at` were given these values, as numpy assigns them."""
-        first, given = at[0] if isinstance(at, tuple) and at else at, np.asarray(values)
+        row_index, block_values = index[0] if isinstance(index, tuple) and index else index, np.asarray(values)
         # HDF5 converts other types, and may write other NaNs than numpy
-        if not isinstance(first, slice) or first.step not in (None, 1) or given.dtype != self.dtype:
+        if not isinstance(row_index, slice) or row_index.step not in (None, 1) or block_values.dtype != self.dtype:
             self._rows[:] = -1
             return
-        a, b, _ = first.indices(self.shape[0])
-        if isinstance(at, tuple) and not all(isinstance(s, slice) and s == slice(None) for s in at[1:]):
+        a, b, _ = row_index.indices(self.shape[0])
+        if isinstance(index, tuple) and not all(isinstance(s, slice) and s == slice(None) for s in index[1:]):
             self._rows[a // self.step : -(-b // self.step)] = -1
             return
-        whole = np.broadcast_to(given, (max(b - a, 0), *self.shape[1:]))
+        rows = np.broadcast_to(block_values, (max(b - a, 0), *self.shape[1:]))
         for block in range(a // self.step, -(-b // self.step)):
             low, high = max(a, block * self.step), min(b, (block + 1) * self.step)
             if self._rows[block] == low - block * self.step:
-                self.sums[block] = crc_of(whole[low - a : high - a], int(self.sums[block]))
+                self.sums[block] = crc_of(rows[low - a : high - a], int(self.sums[block]))
                 self._rows[block] += high - low
             else:
                 self._rows[block] = -1
 
-    def of(self, dataset: Any) -> list[int]:
+    def of(self, dataset: h5py.Dataset) -> list[int]:
         """All CRCs; blocks that were not written in order are read from the dataset."""
         for block in range(len(self.sums)):
             low, high = block * self.step, min((block + 1) * self.step, self.shape[0])
@@ -99,33 +103,33 @@ def crc_of(values: np.ndarray, start: int = 0) -> int:
     return zlib.crc32(np.ascontiguousarray(values).reshape(-1).view(np.uint8).data, start)
 
 
-def layout(file: Any, size: int, rows: str, sums: RunningSums | None) -> Checksums:
-    """Where the arrays of an open HDF5 file lie, and the CRCs of its rows; `complete` adds the others."""
+def layout(file: h5py.File, size: int, rows: str, sums: RunningSums | None) -> Checksums:
+    """Places of the arrays in an open HDF5 file, and the CRCs of its rows; `append` adds those of the arrays."""
     import h5py
 
     arrays: list[tuple[str, int, int, int]] = []
 
-    def visit(name: str, found: Any) -> None:
-        if isinstance(found, h5py.Dataset) and name != rows and (at := found.id.get_offset()) is not None:
-            arrays.append((name, int(at), int(found.id.get_storage_size()), 0))
+    def visit(name: str, member: h5py.Dataset) -> None:
+        if isinstance(member, h5py.Dataset) and name != rows and (offset := member.id.get_offset()) is not None:
+            arrays.append((name, int(offset), int(member.id.get_storage_size()), 0))
 
     file.visititems(visit)
-    at = file[rows].id.get_offset() if rows in file else None
-    if at is None or sums is None:  # rows that were never written have no place yet
+    offset = file[rows].id.get_offset() if rows in file else None
+    if offset is None or sums is None:  # rows that were never written have no place yet
         return Checksums(size, 0, arrays)
-    place = (rows, int(at), int(file[rows].id.get_storage_size()))
+    place = (rows, int(offset), int(file[rows].id.get_storage_size()))
     return Checksums(size, 0, arrays, place, sums.step, sums.of(file[rows]))
 
 
-def append(path: Path, found: Checksums) -> None:
+def append(path: Path, sums: Checksums) -> None:
     """Put the checksums behind an HDF5 file that is closed."""
     with open(path, "r+b") as file:
-        made = asdict(found) | {
-            "arrays": [(name, at, size, _read_crc(file, at, size)) for name, at, size, _ in found.arrays],
-            "rest": _rest(file, found),
+        fields = asdict(sums) | {
+            "arrays": [(name, at, size, _read_crc(file, at, size)) for name, at, size, _ in sums.arrays],
+            "rest": _rest(file, sums),
         }
-        text = json.dumps(made).encode()
-        file.seek(found.size)
+        text = json.dumps(fields).encode()
+        file.seek(sums.size)
         file.write(text + zlib.crc32(text).to_bytes(4, "little") + len(text).to_bytes(8, "little") + MAGIC)
 
 
@@ -149,17 +153,17 @@ def of(path: Path) -> Checksums | None:
         if zlib.crc32(text) != int.from_bytes(end[:4], "little"):
             raise Damaged("its list of checksums is not as it was written")
         try:
-            found = Checksums(**json.loads(text))
+            sums = Checksums(**json.loads(text))
         except (ValueError, TypeError):  # an empty text has the checksum 0
             raise Damaged("its list of checksums is none") from None
-        if found.size != size - END - length:
-            raise Damaged(f"it has {size} bytes and was written with {found.size + END + length}")
-        if _rest(file, found) != found.rest:
+        if sums.size != size - END - length:
+            raise Damaged(f"it has {size} bytes and was written with {sums.size + END + length}")
+        if _rest(file, sums) != sums.rest:
             raise Damaged("its description and tables are not as they were written")
-        for name, at, n, crc in found.arrays:
+        for name, at, n, crc in sums.arrays:
             if _read_crc(file, at, n) != crc:
                 raise Damaged(f"{name} is not as it was written")
-        return found
+        return sums
 
 
 def _without(file: BinaryIO, size: int) -> None:
@@ -167,8 +171,8 @@ def _without(file: BinaryIO, size: int) -> None:
     file.seek(0)
     head = file.read(48)
     version = head[8] if len(head) == 48 and head.startswith(SIGNATURE) else None
-    at = 40 if version == 0 else 28 if version in (2, 3) else None  # of the end of the file, in HDF5's superblock
-    end = size if at is None else int.from_bytes(head[at : at + 8], "little")
+    position = 40 if version == 0 else 28 if version in (2, 3) else None  # of the end of the file, in HDF5's superblock
+    end = size if position is None else int.from_bytes(head[position : position + 8], "little")
     if end > size:
         raise Truncated(f"it has {size:,} of {end:,} bytes")
     if end < size:
@@ -188,12 +192,12 @@ def _read_crc(file: BinaryIO, at: int, size: int, crc: int = 0) -> int:
     return crc
 
 
-def _rest(file: BinaryIO, found: Checksums) -> int:
+def _rest(file: BinaryIO, sums: Checksums) -> int:
     """CRC of the bytes of the HDF5 file that are in no array."""
-    places = [(at, size) for _, at, size, _ in found.arrays]
-    if found.rows is not None:
-        places.append((found.rows[1], found.rows[2]))
+    places = [(at, size) for _, at, size, _ in sums.arrays]
+    if sums.rows is not None:
+        places.append((sums.rows[1], sums.rows[2]))
     crc, start = 0, 0
     for at, size in sorted(places):
         crc, start = _read_crc(file, start, at - start, crc), at + size
-    return _read_crc(file, start, found.size - start, crc)
+    return _read_crc(file, start, sums.size - start, crc)

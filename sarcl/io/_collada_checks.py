@@ -1,20 +1,23 @@
-"""What a COLLADA file (.dae) holds that trimesh would leave out or cover wrongly in silence: refused."""
+"""Surfaces of COLLADA files (.dae) that trimesh would leave out or cover wrongly in silence: refused."""
 
 from __future__ import annotations
 
 import io
 import zipfile
 from collections.abc import Iterator
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from . import _mesh_checks
 
+if TYPE_CHECKING:
+    import collada
+
 AGAIN = "export it again"
 
 
-def opened(data: bytes) -> Any:
+def open_document(data: bytes) -> collada.Collada:
     """The file as pycollada reads it, with the list of what it could not read; its exceptions for what is no file."""
     import collada
 
@@ -27,31 +30,33 @@ def check_kind(data: bytes, what: str) -> None:
         raise ValueError(f"{what} is a zip file, wanted XML: give it the name .zae")
 
 
-def check(made: Any, what: str) -> None:
-    """ValueError for surfaces that are missing or covered wrongly; made  of `opened`."""
-    tag, root = made.tag, made.xmlnode.getroot()
+def check(document: collada.Collada, what: str) -> None:
+    """ValueError for surfaces that are missing or covered wrongly; document  of `open_document`."""
+    tag, root = document.tag, document.xmlnode.getroot()
     if next(root.iter(tag("instance_controller")), None) is not None:
         raise ValueError(
             f"{what} has skins or morphed shapes (controllers), which are not read here; apply them, then {AGAIN}"
         )
     if next(root.iter(tag("ph")), None) is not None:
         raise ValueError(f"{what} has polygons with holes, which are not read here; export it as triangles")
-    wanted = sum(1 for one in root.iter(tag("geometry")) if one.find(tag("mesh")) is not None)
-    lost = wanted - len(made.geometries)
-    if lost > 0:
-        raise ValueError(f"{what}: {lost} of {wanted} geometries cannot be read ({_why(made)}); {AGAIN}")
+    n_declared = sum(1 for one in root.iter(tag("geometry")) if one.find(tag("mesh")) is not None)
+    n_missing = n_declared - len(document.geometries)
+    if n_missing > 0:
+        raise ValueError(f"{what}: {n_missing} of {n_declared} geometries cannot be read ({_why(document)}); {AGAIN}")
     libraries = [*root.iter(tag("library_visual_scenes")), *root.iter(tag("library_nodes"))]
-    wanted = sum(1 for one in libraries for kind in ("geometry", "node") for _ in one.iter(tag(f"instance_{kind}")))
-    placed = [node for one in (*made.scenes, made) for top in one.nodes for node in _instances(top)]
-    lost = wanted - len(placed)
-    if lost > 0:
-        raise ValueError(f"{what}: {lost} of {wanted} placed geometries cannot be read ({_why(made)}); {AGAIN}")
+    n_declared = sum(1 for one in libraries for kind in ("geometry", "node") for _ in one.iter(tag(f"instance_{kind}")))
+    placed = [node for one in (*document.scenes, document) for top in one.nodes for node in _instances(top)]
+    n_missing = n_declared - len(placed)
+    if n_missing > 0:
+        raise ValueError(
+            f"{what}: {n_missing} of {n_declared} placed geometries cannot be read ({_why(document)}); {AGAIN}"
+        )
     for geometry in {id(node.geometry): node.geometry for node in placed if hasattr(node, "geometry")}.values():
         for primitive in geometry.primitives:
             _check_primitive(primitive, f"{what}, geometry {geometry.id!r:.60}")
 
 
-def _instances(node: Any) -> Iterator[Any]:
+def _instances(node: collada.scene.SceneNode) -> Iterator[collada.scene.SceneNode]:
     """Geometries, and other nodes, that a node and its children place; what those nodes hold is listed there."""
     if hasattr(node, "geometry") or hasattr(node, "node"):
         yield node
@@ -60,11 +65,11 @@ def _instances(node: Any) -> Iterator[Any]:
         yield from _instances(child)
 
 
-def _why(made: Any) -> str:
-    return f"{made.errors[0]!s:.120}" if made.errors else "a reference to what is not there"
+def _why(document: collada.Collada) -> str:
+    return f"{document.errors[0]!s:.120}" if document.errors else "a reference to what is not there"
 
 
-def _check_primitive(primitive: Any, where: str) -> None:
+def _check_primitive(primitive: collada.primitive.Primitive, where: str) -> None:
     if getattr(primitive, "vertex_index", None) is None:
         return
     index = np.asarray(primitive.vertex_index, np.int64)
@@ -74,8 +79,8 @@ def _check_primitive(primitive: Any, where: str) -> None:
         return
     corners = np.asarray(primitive.vcounts, np.int64)
     if (corners < 3).any():
-        at = int(np.argmax(corners < 3))
-        raise ValueError(f"{where}: face {at} has {corners[at]} corners, wanted at least 3; {AGAIN}")
+        face = int(np.argmax(corners < 3))
+        raise ValueError(f"{where}: face {face} has {corners[face]} corners, wanted at least 3; {AGAIN}")
     if corners.sum() != len(index):
         raise ValueError(f"{where}: its faces have {corners.sum()} corners, and it holds {len(index)}; {AGAIN}")
     wrong = _mesh_checks.wrong_fans(corners, index, np.asarray(primitive.vertex))

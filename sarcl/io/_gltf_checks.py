@@ -1,4 +1,4 @@
-"""What a glTF 2.0 file needs that its reader would leave out in silence: refused (Khronos, sections 3.6 and 3.7)."""
+"""Surfaces of glTF 2.0 files that their reader would leave out in silence: refused (Khronos, sections 3.6, 3.7)."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from typing import Any
 MAGIC, JSON_CHUNK = b"glTF", 20  # first bytes of a .glb file; where the text of its first chunk begins
 # extensions that change where surfaces are, and those that say how they look, which is not needed
 PLACES = {"EXT_mesh_gpu_instancing", "KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"}
-LOOKS = (
-    "KHR_materials_", "KHR_texture_", "KHR_lights_", "KHR_xmp", "KHR_animation_pointer", "EXT_texture_", "EXT_lights_",
-    "MSFT_texture_", "ADOBE_materials_", "AGI_", "CESIUM_outline", "KHR_mesh_quantization",
-)  # fmt: skip
+LOOKS = tuple(
+    "KHR_materials_ KHR_texture_ KHR_lights_ KHR_xmp KHR_animation_pointer EXT_texture_ EXT_lights_ MSFT_texture_ "
+    "ADOBE_materials_ AGI_ CESIUM_outline KHR_mesh_quantization".split()
+)
 FAN = 6  # mode of a primitive; trimesh reads 4 (triangles) and 5 (strips), and 0 to 3 are points and lines
 INTEGERS = (5120, 5121, 5122, 5123)  # component types of quantized positions
 TAKE = "which is not read here, and its surfaces would be missing or elsewhere"
@@ -51,23 +51,23 @@ def check(data: bytes, what: str) -> None:
                 raise ValueError(f"{what} has fans of triangles (mode 6), {TAKE}; export it as triangles")
             for name in PLACES & set(_object(primitive.get("extensions"))):
                 raise ValueError(f"{what} has meshes with the extension {name!r}, {TAKE}; {AGAIN} it")
-            for at in (primitive.get("indices"), _object(primitive.get("attributes")).get("POSITION")):
-                accessor = accessors[at] if isinstance(at, int) and 0 <= at < len(accessors) else {}
+            for number in (primitive.get("indices"), _object(primitive.get("attributes")).get("POSITION")):
+                accessor = accessors[number] if isinstance(number, int) and 0 <= number < len(accessors) else {}
                 if "sparse" in accessor:
                     raise ValueError(f"{what} has sparse accessors, {TAKE}; {AGAIN} them")
                 if accessor.get("normalized") and accessor.get("componentType") in INTEGERS:
                     raise ValueError(f"{what} has normalized whole numbers as positions, {TAKE}; {AGAIN} quantization")
 
 
-def _list(value: Any) -> list[Any]:
+def _list(value: object) -> list[Any]:
     return value if isinstance(value, list) else []
 
 
-def _object(value: Any) -> dict[str, Any]:
+def _object(value: object) -> dict[str, Any]:
     return value if isinstance(value, dict) else {}
 
 
-def _objects(value: Any) -> Iterator[dict[str, Any]]:
+def _objects(value: object) -> Iterator[dict[str, Any]]:
     """The objects of a list, an empty one for anything else, so that numbers of others stay as they are."""
     for one in _list(value):
         yield _object(one)

@@ -34,16 +34,17 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from ..base import constants, validation
+from ..base.types import PathLike
 from . import _mat5_checks
-from .formats import Make
+from .formats import Make, T
 
 
-def load(path: Any, make: Make, autofocus: bool = False) -> Any:
+def load(path: PathLike, make: Make[T], autofocus: bool = False) -> T:
     """make("phase history", fields) of one Gotcha file.
 
     samples          complex64 (n_pulses, n_frequencies)
@@ -77,7 +78,7 @@ def load(path: Any, make: Make, autofocus: bool = False) -> Any:
         k = 4 * np.pi / constants.SPEED_OF_LIGHT * (frequency + step * np.arange(n_frequencies))
         samples = samples * np.exp(1j * (phase[:, None] - r[:, None] * k))
     name = re.search(r"_(HH|HV|VH|VV)(?![A-Za-z])", path.name)
-    found = {
+    fields = {
         "samples": np.ascontiguousarray(samples, np.complex64),
         "frequency": frequency,
         "frequency_step": step,
@@ -87,7 +88,7 @@ def load(path: Any, make: Make, autofocus: bool = False) -> Any:
         "compressed": True,
     }
     try:
-        return make("phase history", found)
+        return make("phase history", fields)
     except ValueError as exc:
         raise ValueError(f"{path.name}: {exc}") from None
 
@@ -100,20 +101,15 @@ def _struct(path: Path) -> np.void:
         try:
             _mat5_checks.check(file.read())
             file.seek(0)
-            found = loadmat(file, variable_names=["data"])
+            variables = loadmat(file, variable_names=["data"])
         except NotImplementedError:
             raise ValueError(f"{path.name} is a MATLAB 7.3 file, wanted MATLAB 5; save it again with -v7") from None
-        except _mat5_checks.TooLarge as exc:
-            raise ValueError(
-                f"{path.name} has {path.stat().st_size / 1e6:.3g} MB and {exc}, so it is hardly measured data; if you "
-                "trust it, load it elsewhere, and save its struct 'data' alone, without compression (-v6)"
-            ) from None
         except Exception as exc:  # scipy's parser fails in a dozen ways on a damaged file
             raise ValueError(
                 f"{path.name} cannot be read as a MATLAB 5 file ({str(exc) or type(exc).__name__}); "
                 "it is truncated, damaged or something else: copy it again"
             ) from None
-    data = found.get("data")
+    data = variables.get("data")
     if data is None:
         raise ValueError(f"{path.name} has no struct 'data', wanted a Gotcha file; it is truncated or another data set")
     if data.dtype.names is None or data.size != 1:
@@ -124,7 +120,7 @@ def _struct(path: Path) -> np.void:
     return data.reshape(-1)[0]
 
 
-def _field(path: Path, struct: np.void, name: str, dtype: Any, shape: tuple[int | str, ...]) -> np.ndarray:
+def _field(path: Path, struct: np.void, name: str, dtype: DTypeLike, shape: tuple[int | str, ...]) -> np.ndarray:
     if name not in (struct.dtype.names or ()):
         have = ", ".join(struct.dtype.names or ()) or "nothing"
         raise ValueError(f"{path.name}: 'data' has no field {name!r}; it has {have}: is this a Gotcha file?")

@@ -1,4 +1,4 @@
-"""What a mesh file declares, compared with what it holds; and polygons, as fans of triangles where these cover them.
+"""Faces that a mesh file declares and holds; and polygons, as fans of triangles where these cover them.
 
 trimesh reads what it finds of a truncated text file, and covers every polygon by a fan about its first corner.
 """
@@ -11,7 +11,7 @@ import re
 import numpy as np
 
 HEAD = 2**16  # bytes in which a header ends
-FLAT = 1e-9  # of a polygon's area: a triangle of a fan that is turned by less is a line
+FLAT = 1e-9  # area of a reversed triangle of a fan over its polygon's, below which it is a line
 CONCAVE = "is concave or crosses itself, and its triangles are not in the file; export it as triangles"
 TAKE = "it is truncated, damaged or not what its name says; export it again"
 
@@ -25,8 +25,8 @@ def declared_faces(data: bytes, kind: str, what: str) -> int | None:
         return _of_stl(data, what)
     if kind == ".off":
         text = re.sub(rb"#[^\n]*", b"", data[:HEAD])
-        found = re.match(rb"\s*(?:ST)?C?N?4?n?OFF\s+(\d+)\s+(\d+)", text)
-        return int(found[2]) if found else None
+        match = re.match(rb"\s*(?:ST)?C?N?4?n?OFF\s+(\d+)\s+(\d+)", text)
+        return int(match[2]) if match else None
     return None
 
 
@@ -44,8 +44,8 @@ def check_indices(vertices: np.ndarray, faces: np.ndarray, what: str) -> None:
         )
     wrong = (faces < 0) | (faces >= len(vertices))
     if wrong.any():
-        at = int(np.flatnonzero(wrong.any(axis=1))[0])
-        raise ValueError(f"{what}: face {at} names vertex {faces[at][wrong[at]][0]} of {len(vertices)}: {TAKE}")
+        face = int(np.flatnonzero(wrong.any(axis=1))[0])
+        raise ValueError(f"{what}: face {face} names vertex {faces[face][wrong[face]][0]} of {len(vertices)}: {TAKE}")
 
 
 def _of_stl(data: bytes, what: str) -> int | None:
@@ -97,14 +97,14 @@ def wrong_fans(corners: np.ndarray, index: np.ndarray, vertices: np.ndarray) -> 
 
     Polygons that name vertices that there are not, of vertices (n, 3), or that are not finite, are left to others.
     """
-    found: list[int] = []
+    wrong_polygons: list[int] = []
     begin = np.cumsum(corners) - corners
     for length in np.unique(corners[corners > 3]):
         numbers = np.flatnonzero(corners == length)
-        of_each = index[begin[numbers][:, None] + np.arange(length)]
-        there = np.asarray(((of_each >= 0) & (of_each < len(vertices))).all(axis=1))
-        places = vertices[np.where(there[:, None], of_each, 0)]
+        polygons = index[begin[numbers][:, None] + np.arange(length)]
+        is_complete = np.asarray(((polygons >= 0) & (polygons < len(vertices))).all(axis=1))
+        corners_at = vertices[np.where(is_complete[:, None], polygons, 0)]
         with np.errstate(all="ignore"):
-            wrong = there & np.isfinite(places).all(axis=(1, 2)) & ~fans_fit(places)
-        found += numbers[wrong].tolist()
-    return sorted(found)
+            wrong = is_complete & np.isfinite(corners_at).all(axis=(1, 2)) & ~fans_fit(corners_at)
+        wrong_polygons += numbers[wrong].tolist()
+    return sorted(wrong_polygons)

@@ -8,7 +8,7 @@ import numpy as np
 
 log = logging.getLogger(__name__)
 
-SAME_PLACE = 1e-8  # of the mesh's size: corners closer than this are one
+SAME_PLACE = 1e-8  # distance over the mesh's size, below which corners are one
 SEEN_FROM = 8  # faces of a body whose middles tell whether it lies inside another
 
 
@@ -24,18 +24,18 @@ def repaired(vertices: np.ndarray, faces: np.ndarray, repair: bool, what: str) -
     # bodies that touch are closed before their corners are merged, and may not be closed afterwards
     for corners in (faces, place):
         if repair:
-            turned = _wound(corners, kept, vertices[faces])
+            turned = _faces_to_reverse(corners, kept, vertices[faces])
             # closed bodies may share a wall with two faces; elsewhere faces that differ in winding alone are one face
-            alike = _closed(_turn(corners, turned)[kept])
-            first = _first(_turn(place, turned), kept, alike)
+            alike = _is_closed(_turn(corners, turned)[kept])
+            first = _without_repeats(_turn(place, turned), kept, alike)
             repeated += int(kept.sum() - first.sum())
             kept = first
             if not alike:  # repeated faces have hidden which faces are neighbours
-                turned = _wound(corners, kept, vertices[faces])
-        closed = _closed(_turn(corners, turned)[kept])
+                turned = _faces_to_reverse(corners, kept, vertices[faces])
+        closed = _is_closed(_turn(corners, turned)[kept])
         if closed:
             break
-    if not closed and repair and not _oriented(place, turned, kept):
+    if not closed and repair and not _is_oriented(place, turned, kept):
         log.info("%s has faces that no winding could make agree with their neighbours", what)
     for n, why in (
         (collapsed, "left out: two of their corners are one"),
@@ -48,7 +48,7 @@ def repaired(vertices: np.ndarray, faces: np.ndarray, repair: bool, what: str) -
 
 
 def _weld(vertices: np.ndarray) -> np.ndarray:
-    """For each corner (n,) a number that corners at the same position share."""
+    """Numbers of corners (n,): those at the same position share one."""
     size = float(np.ptp(vertices, axis=0).max()) or 1.0
     cell = np.rint((vertices - vertices.min(axis=0)) / (SAME_PLACE * size)).astype(np.int64)
     return np.unique(cell, axis=0, return_inverse=True)[1].reshape(-1)
@@ -58,7 +58,7 @@ def _turn(faces: np.ndarray, turned: np.ndarray) -> np.ndarray:
     return np.where(turned[:, None], faces[:, ::-1], faces)
 
 
-def _first(faces: np.ndarray, kept: np.ndarray, alike: bool) -> np.ndarray:
+def _without_repeats(faces: np.ndarray, kept: np.ndarray, alike: bool) -> np.ndarray:
     """`kept` without faces that repeat an earlier one: the same corners, and if `alike` the same winding."""
     start = faces.argmin(axis=1)[:, None]
     key = np.take_along_axis(faces, (start + np.arange(3)) % 3, axis=1) if alike else np.sort(faces, axis=1)
@@ -77,7 +77,7 @@ def _edges(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return number, forward, np.repeat(np.arange(len(faces)), 3)
 
 
-def _closed(faces: np.ndarray) -> bool:
+def _is_closed(faces: np.ndarray) -> bool:
     """True where every edge belongs to two faces that pass it in opposite directions."""
     number, forward, _ = _edges(faces)
     return bool(
@@ -85,14 +85,14 @@ def _closed(faces: np.ndarray) -> bool:
     )
 
 
-def _oriented(faces: np.ndarray, turned: np.ndarray, kept: np.ndarray) -> bool:
+def _is_oriented(faces: np.ndarray, turned: np.ndarray, kept: np.ndarray) -> bool:
     """True where no two faces that alone share an edge pass it in the same direction."""
     number, forward, _ = _edges(_turn(faces, turned)[kept])
     pair = np.bincount(number) == 2
     return bool((np.bincount(number, weights=forward * 2 - 1.0)[pair] == 0).all())
 
 
-def _wound(faces: np.ndarray, kept: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+def _faces_to_reverse(faces: np.ndarray, kept: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Faces to reverse, of those kept, so that neighbours have one winding and closed bodies face outwards.
 
     A closed body inside another is turned round only with it: wound inwards, it is the wall of a cavity.
@@ -133,7 +133,7 @@ def _wound(faces: np.ndarray, kept: np.ndarray, triangles: np.ndarray) -> np.nda
 
 
 def _outermost(triangles: np.ndarray, body: np.ndarray, bodies: np.ndarray, volume: np.ndarray) -> np.ndarray:
-    """For each of the closed `bodies` (m,) the largest that holds it, or itself; body (k,) of triangles (k, 3, 3)."""
+    """Largest body that holds each of the closed `bodies` (m,), or itself; body (k,) of triangles (k, 3, 3)."""
     order = np.argsort(body, kind="stable")
     begin, end = np.searchsorted(body[order], [bodies, bodies + 1])
     parts = [triangles[order[a:b]] for a, b in zip(begin, end, strict=True)]
@@ -151,16 +151,16 @@ def _outermost(triangles: np.ndarray, body: np.ndarray, bodies: np.ndarray, volu
 
 
 def _turns_about(triangles: np.ndarray, places: np.ndarray) -> float:
-    """How often closed triangles (k, 3, 3) wind about places (n, 3), the mean of |number|.
+    """Winding number of closed triangles (k, 3, 3) about places (n, 3), the mean of |number|.
 
     The sum of their solid angles over 4 pi: of a triangle a, b, c as seen from 0, twice the angle whose tangent is
     a.(b x c) / (|a||b||c| + a.b |c| + b.c |a| + c.a |b|).
     """
-    found = 0.0
+    angle = 0.0
     for place in places:
         a, b, c = np.moveaxis(triangles - place, 1, 0)
         la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
         over = np.einsum("ij,ij->i", a, np.cross(b, c))
         under = la * lb * lc + (a * b).sum(1) * lc + (b * c).sum(1) * la + (c * a).sum(1) * lb
-        found += abs(float(np.arctan2(over, under).sum()))
-    return found / (2 * np.pi * len(places))
+        angle += abs(float(np.arctan2(over, under).sum()))
+    return angle / (2 * np.pi * len(places))

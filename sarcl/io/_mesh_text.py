@@ -29,34 +29,35 @@ def of_obj(data: bytes, what: str) -> bytes | None:
     if text is None or not ODD.search(text := text.replace("\\\n", " ")):
         return None
     lines = text.split("\n")
-    seen = {"v": 0, "vt": 0, "vn": 0}
+    counts = {"v": 0, "vt": 0, "vn": 0}
     vertices: list[list[str]] = []
     faces: list[tuple[int, list[list[int | None]]]] = []  # number of the line, and v/vt/vn of its corners
-    for at, line in enumerate(lines):
+    for number, line in enumerate(lines):
         word, *rest = line.split("#")[0].split() or [""]
-        if word in seen:
-            seen[word] += 1
-            lines[at] = line.partition("#")[0]
+        if word in counts:
+            counts[word] += 1
+            lines[number] = line.partition("#")[0]
             if word == "v":
                 vertices.append(rest[:3])
         elif word == "f":
-            corners = [_corner(corner, seen, f"{what}, line {at + 1}") for corner in rest]
-            faces.append((at, corners))
-            lines[at] = _face(corners)
+            corners = [_corner(corner, counts, f"{what}, line {number + 1}") for corner in rest]
+            faces.append((number, corners))
+            words = ("/".join("" if i is None else str(i) for i in corner) for corner in corners)
+            lines[number] = " ".join(["f", *words])
     points = _numbers(vertices)
     if points is not None:
         for number in _wrong_fans([[(corner[0] or 0) - 1 for corner in corners] for _, corners in faces], points):
-            at, corners = faces[number]
-            raise ValueError(f"{what}, line {at + 1}: a face of {len(corners)} corners {_mesh_checks.CONCAVE}")
+            number, corners = faces[number]
+            raise ValueError(f"{what}, line {number + 1}: a face of {len(corners)} corners {_mesh_checks.CONCAVE}")
     return "\n".join(lines).encode()
 
 
-def _corner(word: str, seen: dict[str, int], where: str) -> list[int | None]:
+def _corner(word: str, counts: dict[str, int], where: str) -> list[int | None]:
     """Indices v/vt/vn of a corner, counted from 1; None where one is left out."""
-    made: list[int | None] = []
-    for name, digits in zip(seen, word.split("/"), strict=False):
+    indices: list[int | None] = []
+    for name, digits in zip(counts, word.split("/"), strict=False):
         if not digits:
-            made.append(None)
+            indices.append(None)
             continue
         try:
             index = int(digits)
@@ -64,18 +65,14 @@ def _corner(word: str, seen: dict[str, int], where: str) -> list[int | None]:
             raise ValueError(
                 f"{where}: {word!r:.40} is no corner of a face, wanted v, v/vt, v//vn or v/vt/vn"
             ) from None
-        absolute = seen[name] + 1 + index if index < 0 else index
+        absolute = counts[name] + 1 + index if index < 0 else index
         if absolute < 1:
             raise ValueError(
-                f"{where}: index {index} of {name}, of which {seen[name]} come before this line; they are counted from "
-                "1, or back from -1: export it again"
+                f"{where}: index {index} of {name}, of which {counts[name]} come before this line; they are counted "
+                "from 1, or back from -1: export it again"
             )
-        made.append(absolute)
-    return made
-
-
-def _face(corners: list[list[int | None]]) -> str:
-    return " ".join(["f", *("/".join("" if i is None else str(i) for i in corner) for corner in corners)])
+        indices.append(absolute)
+    return indices
 
 
 def check_off(data: bytes, what: str) -> None:
@@ -120,7 +117,7 @@ def _decoded(data: bytes) -> str | None:
 def _numbers(rows: list[list[str]]) -> np.ndarray | None:
     """Rows of three numbers, (n, 3); None where they are not."""
     try:
-        made = np.array(rows, np.float64)
+        numbers = np.array(rows, np.float64)
     except ValueError:
         return None
-    return made if made.ndim == 2 and made.shape[1] == 3 else None
+    return numbers if numbers.ndim == 2 and numbers.shape[1] == 3 else None

@@ -13,11 +13,8 @@ from .xml import virtual_rasters
 # endings of pictures, which a mesh may name as textures: nothing here needs them
 PICTURES = (".png", ".jpg", ".jpeg", ".tga", ".tif", ".tiff", ".bmp", ".gif", ".dds", ".webp", ".ktx", ".ktx2", ".hdr")
 # GDAL's drivers whose files name others, or addresses of a network; all but GTI are XML or JSON
-CATALOGUES = {
-    "WMS", "WCS", "WMTS", "HTTP", "PLMOSAIC", "EEDA", "EEDAI", "STACIT", "STACTA", "ESRIC", "NGW", "OGCAPI", "GTI",
-}  # fmt: skip
+CATALOGUES = set("WMS WCS WMTS HTTP PLMOSAIC EEDA EEDAI STACIT STACTA ESRIC NGW OGCAPI GTI".split())
 NESTED = 8  # levels of virtual rasters of virtual rasters
-MOST_SOURCES = 100_000  # rasters that a virtual raster reads, through others too; models of the Earth have 26 000
 HDF5 = b"\x89HDF\r\n\x1a\n"
 ALLOW = "which sarcl does not follow; external=True allows it for files that you trust"
 
@@ -26,14 +23,14 @@ def beside(path: Path, name: str) -> Path | None:
     """The file of that name in the folder of `path`, or below it; None where it lies outside that folder."""
     folder = path.parent.resolve()
     try:
-        found = (folder / name.strip()).resolve()
+        file = (folder / name.strip()).resolve()
     except (OSError, ValueError, RuntimeError):  # no name of a file, or links in a circle
         return None
-    return found if found.is_relative_to(folder) else None
+    return file if file.is_relative_to(folder) else None
 
 
 class Resolver:
-    """What trimesh asks for the files that a mesh names: buffers and materials, from the mesh's own folder.
+    """Files that a mesh names, as trimesh asks for them: buffers and materials, from the mesh's own folder.
 
     external  files elsewhere are read too
     refused   names of files elsewhere that were asked for
@@ -47,15 +44,15 @@ class Resolver:
         """The bytes of a file; FileNotFoundError for one that there is not, that is refused, or is a picture."""
         if name.strip().lower().endswith(PICTURES):
             raise FileNotFoundError(name)
-        for spelled in dict.fromkeys((name, unquote(name))):
-            found = beside(self.path, spelled)
-            if found is None:
+        for spelling in dict.fromkeys((name, unquote(name))):
+            file = beside(self.path, spelling)
+            if file is None:
                 if not self.external:
                     self.refused.append(name)
                     raise FileNotFoundError(name)
-                found = self.path.parent / spelled.strip()
-            if found.exists():
-                return input_paths.contents(found, "mesh file")
+                file = self.path.parent / spelling.strip()
+            if file.exists():
+                return input_paths.contents(file, "mesh file")
         raise FileNotFoundError(f"there is no file {name!r} beside it")
 
     __getitem__ = get
@@ -69,23 +66,13 @@ class Resolver:
         return Resolver(self.path.parent / namespace / self.path.name, self.external)
 
 
-def check_raster(path: Path, name: str) -> None:
+def check_raster(path: Path, name: str, depth: int = 0) -> None:
     """ValueError, beginning with `name`, for a raster that leads to files outside its folder, before GDAL opens it.
 
     Virtual rasters (VRT) name their sources, HDF5 files (netCDF 4, BAG) may hold external storage and links. Other XML,
     JSON and indices of tiles (GTI) name files anywhere, or addresses of a network.
-    """
-    _reads(path, name, 0, {})
-
-
-def _reads(path: Path, name: str, depth: int, known: dict[Path, int]) -> int:
-    """How many rasters GDAL reads for one, after the checks of `check_raster`.
-
     depth  virtual rasters that led to this one
-    known  what was found before: two sources each, 60 levels deep, are more rasters than can be read
     """
-    if path in known:
-        return known[path]
     with open(path, "rb") as file:
         head = file.read(512)
     if head.startswith(HDF5):
@@ -93,13 +80,10 @@ def _reads(path: Path, name: str, depth: int, known: dict[Path, int]) -> int:
     elif re.match(rb"(\xef\xbb\xbf)?\s*<", head):
         if depth > NESTED:
             raise ValueError(f"{name} is a virtual raster of virtual rasters, {NESTED} deep; give one of its sources")
-        known[path] = sum(_reads(source, name, depth + 1, known) for source in _sources(path, name))
-        if known[path] > MOST_SOURCES:
-            raise ValueError(f"{name} reads more than {MOST_SOURCES:,} rasters; give those of the part that is seen")
-        return known[path]
+        for source in _sources(path, name):
+            check_raster(source, name, depth + 1)
     elif re.match(rb"(\xef\xbb\xbf)?\s*[{[]", head) or ".gti" in path.name.lower():
         raise _catalogue(name)
-    return 1
 
 
 def check_parts(path: Path, driver: str, files: list[str], name: str) -> None:
@@ -122,12 +106,12 @@ def _sources(path: Path, name: str) -> Iterator[Path]:
     except virtual_rasters.Refused as exc:
         raise ValueError(f"{name} {exc}") from None
     for source in sources:
-        found = beside(path, str(source))
-        if found is None:
+        file = beside(path, str(source))
+        if file is None:
             raise ValueError(f"{name} leads to another file: '{source}', outside its folder, {ALLOW}")
-        if not found.is_file():
+        if not file.is_file():
             raise ValueError(f"{name} names '{source!s:.100}', and there is no such file in its folder; put it there")
-        yield found
+        yield file
 
 
 def _check_hdf5(path: Path, name: str) -> None:

@@ -12,7 +12,10 @@ import stat
 import time
 import zlib
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ..base.types import PathLike
 
 log = logging.getLogger(__name__)
 
@@ -38,26 +41,26 @@ class Part:
                 self._lock: int | None = os.open(self.path, flags, 0o666)
             except FileExistsError:
                 continue
-            if _locked(self._lock) is not False and _is(self._lock, self.path):
+            if _try_lock(self._lock) is not False and _is_file_at(self._lock, self.path):
                 return
             os.close(self._lock)  # another process took it for a leftover before it was locked
 
     @classmethod
-    def begun(cls, target: Path, shown: Any, alone: bool) -> Part:
+    def begun(cls, target: Path, shown: PathLike, alone: bool) -> Part:
         """A new file, after the removal of files beside it that no living process owns.
 
         alone  FileExistsError, which names `shown`, while another process has a file for the same target
         """
         for _ in range(TRIES):
-            made = cls(target)
+            part = cls(target)
             try:
-                others = _clean(target, made.path)
+                others = _clean(target, part.path)
             except BaseException:
-                made.remove()
+                part.remove()
                 raise
             if not (alone and others):
-                return made
-            made.remove()
+                return part
+            part.remove()
             time.sleep(0.05 * float(secrets.randbelow(1000)) / 1000)
         raise FileExistsError(
             f"cannot write {str(shown)!r}: another run is writing it; wait for that one or choose another name"
@@ -76,20 +79,20 @@ class Part:
 
     def restore(self) -> None:
         """Write anew what this file, still open here, holds, where its folder or its name was deleted meanwhile."""
-        if self._lock is None or _is(self._lock, self.path):
+        if self._lock is None or _is_file_at(self._lock, self.path):
             return
         self.target.parent.mkdir(parents=True, exist_ok=True)
         log.warning("%s was deleted while %s was written in it; it is made again", self.target.parent, self.target.name)
-        made = Part(self.target)
+        part = Part(self.target)
         try:
-            with open(os.dup(self._lock), "rb") as held, open(made.path, "wb") as file:
-                held.seek(0)
-                shutil.copyfileobj(held, file)
+            with open(os.dup(self._lock), "rb") as source, open(part.path, "wb") as file:
+                source.seek(0)
+                shutil.copyfileobj(source, file)
         except BaseException:
-            made.remove()
+            part.remove()
             raise
         os.close(self._lock)
-        self.path, self._lock = made.path, made._lock
+        self.path, self._lock = part.path, part._lock
 
     def remove(self) -> None:
         """Remove this file."""
@@ -115,7 +118,7 @@ def _tag(target: Path) -> str:
     return f"{zlib.crc32(os.fsencode(target.name)):08x}"
 
 
-def _locked(descriptor: int) -> bool | None:
+def _try_lock(descriptor: int) -> bool | None:
     """True where the file is locked now, without waiting; False where another has it; None without locks here."""
     try:
         import fcntl
@@ -130,7 +133,7 @@ def _locked(descriptor: int) -> bool | None:
     return True
 
 
-def _is(descriptor: int, path: Path) -> bool:
+def _is_file_at(descriptor: int, path: Path) -> bool:
     """Whether `path` still names the open file."""
     try:
         return os.path.samestat(os.fstat(descriptor), os.lstat(path))
@@ -146,21 +149,21 @@ def _clean(target: Path, own: Path) -> bool:
         if match is None or path == own:
             continue
         try:
-            found = os.open(path, os.O_RDWR | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0))
+            descriptor = os.open(path, os.O_RDWR | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0))
         except OSError:  # a link, or of another user, or gone
             continue
         try:
-            status = os.fstat(found)
+            status = os.fstat(descriptor)
             mine = stat.S_ISREG(status.st_mode) and (not hasattr(os, "getuid") or status.st_uid == os.getuid())
-            free = _locked(found)
+            free = _try_lock(descriptor)
             if free is False:
                 others |= match["target"] == _tag(target)
             elif free and mine and (match["host"] == _host() or time.time() - status.st_mtime > OLD):
-                if _is(found, path):
+                if _is_file_at(descriptor, path):
                     path.unlink()
                     log.info("removed %s, which a killed run left", path)
         except OSError as exc:
             log.debug("%s stays: %s", path, exc)
         finally:
-            os.close(found)
+            os.close(descriptor)
     return others

@@ -9,11 +9,17 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from . import _checksums, hdf5, output_paths
+
+if TYPE_CHECKING:
+    import h5py
+    from numpy.typing import ArrayLike, DTypeLike
+
+    from ..base.types import PathLike
 
 log = logging.getLogger(__name__)
 
@@ -27,7 +33,7 @@ class Unfinished:
     disk, raises OSError with the remedy. Raises what `output_paths.check_writable` does.
     """
 
-    def __init__(self, path: Any, kind: str, n_bytes: int, resumes: bool = False) -> None:
+    def __init__(self, path: PathLike, kind: str, n_bytes: int, resumes: bool = False) -> None:
         import h5py
 
         self.path, self.kind, self.n_bytes, self.resumes = Path(path), kind, n_bytes, resumes
@@ -53,8 +59,8 @@ class Unfinished:
         try:
             yield
         except (OSError, RuntimeError) as exc:  # h5py raises either for the same full disk
-            found = re.search(r"errno = (\d+)", str(exc))
-            number = int(found[1]) if found else getattr(exc, "errno", None)
+            match = re.search(r"errno = (\d+)", str(exc))
+            number = int(match[1]) if match else getattr(exc, "errno", None)
             why = os.strerror(number) if number else " ".join(str(exc).split())[:100]
             more = " and give the same call again"
             if self.resumes:
@@ -62,7 +68,7 @@ class Unfinished:
             what = f"the {self.kind.replace('_', ' ')}"
             raise output_paths.no_room(self.path, OSError(number, why), self.n_bytes, what, more) from exc
 
-    def dataset(self, name: str, shape: tuple[int, ...], dtype: Any) -> Filled:
+    def dataset(self, name: str, shape: tuple[int, ...], dtype: DTypeLike) -> Filled:
         """The dataset of the file's rows, zero until written; it gets checksums by blocks."""
         sums = _checksums.RunningSums(shape, dtype)
         self._rows = name, sums
@@ -87,11 +93,11 @@ class Unfinished:
         assert self._part is not None
         with self.writing():
             self.file.flush()
-            found = _checksums.layout(self.file, self.file.id.get_filesize(), *(self._rows or ("", None)))
+            sums = _checksums.layout(self.file, self.file.id.get_filesize(), *(self._rows or ("", None)))
             self.file.close()
             self._part.restore()
-            os.truncate(self._part.path, found.size)  # releases the bytes that were reserved and not used
-            _checksums.append(self._part.path, found)
+            os.truncate(self._part.path, sums.size)  # releases the bytes that were reserved and not used
+            _checksums.append(self._part.path, sums)
         self._part.commit()
         self._part = None
 
@@ -121,14 +127,14 @@ class Unfinished:
 class Filled:
     """A dataset of an unfinished file, read and written in slices like an h5py.Dataset."""
 
-    def __init__(self, owner: Unfinished, dataset: Any, sums: _checksums.RunningSums) -> None:
+    def __init__(self, owner: Unfinished, dataset: h5py.Dataset, sums: _checksums.RunningSums) -> None:
         self.owner, self.dataset, self.sums = owner, dataset, sums
         self.shape, self.dtype = dataset.shape, np.dtype(dataset.dtype)
 
-    def __getitem__(self, at: Any) -> Any:
+    def __getitem__(self, at: object) -> np.ndarray:
         return self.dataset[at]
 
-    def __setitem__(self, at: Any, values: Any) -> None:
+    def __setitem__(self, at: object, values: ArrayLike) -> None:
         with self.owner.writing():
             self.dataset[at] = values
         self.sums.wrote(at, values)

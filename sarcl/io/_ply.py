@@ -8,19 +8,21 @@ from __future__ import annotations
 import re
 from collections import Counter
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Literal
 
 import numpy as np
 
 from . import _mesh_checks
 
-TYPES = {
-    "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4",
-    "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4",
-    "int64": "i8", "uint64": "u8", "float16": "f2", "float32": "f4", "float64": "f8",
-}  # fmt: skip
+C_TYPES = "char:i1 uchar:u1 short:i2 ushort:u2 int:i4 uint:u4 float:f4 double:f8"
+SIZED_TYPES = (
+    "int8:i1 uint8:u1 int16:i2 uint16:u2 int32:i4 uint32:u4 int64:i8 uint64:u8 float16:f2 float32:f4 float64:f8"
+)
+TYPES = dict(pair.split(":") for pair in f"{C_TYPES} {SIZED_TYPES}".split())  # NumPy's types by those of a header
 HEADER = re.compile(rb"ply[ \t]*\r?\n((?:.*?\n)??)[ \t]*end_header[ \t]*(?:\r?\n|$)", re.DOTALL)
-ORDER = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}  # of bytes; text has none
+Order = Literal["", "<", ">"]
+# order of bytes by the name of a format; text has none
+ORDER: dict[str, Order] = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 FACES = ("vertex_index", "vertex_indices")
 PIECE = 2**18  # numbers read at a time, so that what is made on the way to them stays small
 LONGEST = 400  # characters of a number as text: the largest of float64 has 309 digits before its point
@@ -57,26 +59,27 @@ def read(data: bytes, what: str) -> tuple[np.ndarray, np.ndarray]:
         raise ValueError(f"{what} cannot be read as .ply (no header from 'ply' to 'end_header'): {_mesh_checks.TAKE}")
     order, elements = _header(head[1].decode("latin-1"), what)
     body = _Text(data[head.end() :], what) if not order else _Binary(data[head.end() :], order)
-    at = 0
+    position = 0
     for element in elements:
-        at = _place(element, body, at, what)
-    if at != body.size:
-        raise ValueError(f"{what} holds {body.size - at} {body.unit} more than it declares: {_mesh_checks.TAKE}")
-    named = {element.name: element for element in elements if element.rows}
-    for name in named:
+        position = _place(element, body, position, what)
+    if position != body.size:
+        raise ValueError(f"{what} holds {body.size - position} {body.unit} more than it declares: {_mesh_checks.TAKE}")
+    elements_by_name = {element.name: element for element in elements if element.rows}
+    for name in elements_by_name:
         if name.startswith("tristrip"):
             raise ValueError(
                 f"{what} has strips of triangles ({name}), which are not read here; export it as triangles"
             )
-    if "vertex" not in named or "face" not in named:
+    if "vertex" not in elements_by_name or "face" not in elements_by_name:
         return np.zeros((0, 3)), np.zeros((0, 3), np.int64)
-    vertices = _vertices(named["vertex"], body, what)
-    return vertices, _triangles(named["face"], body, vertices, what)
+    vertices = _vertices(elements_by_name["vertex"], body, what)
+    return vertices, _triangles(elements_by_name["face"], body, vertices, what)
 
 
-def _header(text: str, what: str) -> tuple[str, list[_Element]]:
+def _header(text: str, what: str) -> tuple[Order, list[_Element]]:
     """(order of bytes, "" for text; the elements)."""
-    order, elements = None, list[_Element]()
+    order: Order | None = None
+    elements: list[_Element] = []
     for line in text.split("\n"):  # str.splitlines also splits within characters of comments, as "Å" in UTF-8
         words = line.split()
         if not words or words[0] in ("comment", "obj_info"):
@@ -144,9 +147,9 @@ class _Text:
 
     def take(self, places: np.ndarray, type_: np.dtype) -> np.ndarray:
         """Numbers as written, floating-point ones rounded to their type."""
-        made = self.numbers[places]
+        numbers = self.numbers[places]
         with np.errstate(over="ignore"):
-            return made.astype(type_).astype(np.float64) if type_.kind == "f" else made
+            return numbers.astype(type_).astype(np.float64) if type_.kind == "f" else numbers
 
 
 class _Binary:
@@ -154,7 +157,7 @@ class _Binary:
 
     unit = "bytes"
 
-    def __init__(self, body: bytes, order: Any) -> None:
+    def __init__(self, body: bytes, order: Literal["<", ">"]) -> None:
         self.body, self.order, self.size = body, order, len(body)
         self.bytes = np.frombuffer(body, np.uint8)
 
@@ -165,11 +168,11 @@ class _Binary:
         return float(np.frombuffer(self.body, type_.newbyteorder(self.order), 1, place)[0])
 
     def take(self, places: np.ndarray, type_: np.dtype) -> np.ndarray:
-        made = np.empty(len(places), type_)
+        numbers = np.empty(len(places), type_)
         for at in range(0, len(places), PIECE):
-            some = self.bytes[places[at : at + PIECE, None] + np.arange(type_.itemsize)]
-            made[at : at + PIECE] = some.view(type_.newbyteorder(self.order)).reshape(-1)
-        return made
+            piece = self.bytes[places[at : at + PIECE, None] + np.arange(type_.itemsize)]
+            numbers[at : at + PIECE] = piece.view(type_.newbyteorder(self.order)).reshape(-1)
+        return numbers
 
 
 def _place(element: _Element, body: _Text | _Binary, at: int, what: str) -> int:
@@ -217,22 +220,22 @@ def _count(element: _Element, row: int, p: _Property, body: _Text | _Binary, at:
     """The length of a list."""
     if p.count is None or at + body.width(p.count) > body.size:
         raise _short(element, row, what)
-    given = body.one(at, p.count)
+    count = body.one(at, p.count)
     largest = np.iinfo(p.count).max if p.count.kind in "iu" else 2.0**31
-    if not (0 <= given <= largest and given == int(given)):
+    if not (0 <= count <= largest and count == int(count)):
         raise ValueError(
-            f"{what}: {element.name} {row} has {given:g} {p.name}, wanted a whole number from 0 to {largest:.10g}, the "
+            f"{what}: {element.name} {row} has {count:g} {p.name}, wanted a whole number from 0 to {largest:.10g}, the "
             f"largest of the declared type: {_mesh_checks.TAKE}"
         )
-    if at + body.width(p.count) + int(given) * body.width(p.type) > body.size:
+    if at + body.width(p.count) + int(count) * body.width(p.type) > body.size:
         raise _short(element, row, what)
-    return int(given)
+    return int(count)
 
 
 def _short(element: _Element, rows: int, what: str) -> ValueError:
     noun = PLURAL.get(element.name, f"rows of {element.name!r:.40}")
-    found = f"it declares {element.rows} {noun} and holds {rows}"
-    return ValueError(f"{what} cannot be read as .ply ({found}): {_mesh_checks.TAKE}")
+    difference = f"it declares {element.rows} {noun} and holds {rows}"
+    return ValueError(f"{what} cannot be read as .ply ({difference}): {_mesh_checks.TAKE}")
 
 
 def _vertices(element: _Element, body: _Text | _Binary, what: str) -> np.ndarray:
@@ -241,8 +244,10 @@ def _vertices(element: _Element, body: _Text | _Binary, what: str) -> np.ndarray
         raise ValueError(
             f"{what} has vertices of {', '.join(types) or 'nothing'}, wanted x, y and z: {_mesh_checks.TAKE}"
         )
-    made = [_whole(body.take(element.start[name], types[name]), types[name], name, what) for name in "xyz"]
-    return np.stack(made, axis=1).astype(np.float64)
+    coordinates = [
+        _whole_numbers(body.take(element.start[name], types[name]), types[name], name, what) for name in "xyz"
+    ]
+    return np.stack(coordinates, axis=1).astype(np.float64)
 
 
 def _triangles(element: _Element, body: _Text | _Binary, vertices: np.ndarray, what: str) -> np.ndarray:
@@ -252,26 +257,26 @@ def _triangles(element: _Element, body: _Text | _Binary, vertices: np.ndarray, w
         raise ValueError(f"{what} has faces without a list {' or '.join(FACES)}: {_mesh_checks.TAKE}")
     corners = element.length[p.name]
     if (corners < 3).any():
-        at = int(np.argmax(corners < 3))
-        raise ValueError(f"{what}: face {at} has {corners[at]} corners, wanted at least 3: {_mesh_checks.TAKE}")
+        face = int(np.argmax(corners < 3))
+        raise ValueError(f"{what}: face {face} has {corners[face]} corners, wanted at least 3: {_mesh_checks.TAKE}")
     begin = np.cumsum(corners) - corners
     within = np.arange(int(corners.sum())) - np.repeat(begin, corners)
-    given = body.take(np.repeat(element.start[p.name], corners) + within * body.width(p.type), p.type)
+    index = body.take(np.repeat(element.start[p.name], corners) + within * body.width(p.type), p.type)
     owner = np.repeat(np.arange(element.rows), corners)
-    wrong = ~((given >= 0) & (given < len(vertices)))
-    if wrong.any():
-        at = int(np.argmax(wrong))
+    is_wrong = ~((index >= 0) & (index < len(vertices)))
+    if is_wrong.any():
+        face = int(np.argmax(is_wrong))
         raise ValueError(
-            f"{what}: face {owner[at]} names vertex {given[at]:.20g} of {len(vertices)}: {_mesh_checks.TAKE}"
+            f"{what}: face {owner[face]} names vertex {index[face]:.20g} of {len(vertices)}: {_mesh_checks.TAKE}"
         )
-    index = _whole(given, p.type, p.name, what).astype(np.int64)
+    index = _whole_numbers(index, p.type, p.name, what).astype(np.int64)
     wrong_faces = _mesh_checks.wrong_fans(corners, index, vertices)
     if wrong_faces:
         raise ValueError(f"{what}: face {wrong_faces[0]}, of {corners[wrong_faces[0]]} corners, {_mesh_checks.CONCAVE}")
     return _mesh_checks.fans(corners, index)
 
 
-def _whole(given: np.ndarray, type_: np.dtype, name: str, what: str) -> np.ndarray:
+def _whole_numbers(given: np.ndarray, type_: np.dtype, name: str, what: str) -> np.ndarray:
     """`given`; ValueError for numbers of text that do not fit the whole-number type that is declared for them."""
     if type_.kind == "f" and name in "xyz":
         return given

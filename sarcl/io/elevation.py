@@ -5,16 +5,22 @@ from __future__ import annotations
 import logging
 import re
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..base import arguments, errors, validation, wgs84
 from . import _other_files, input_paths
+
+if TYPE_CHECKING:
+    from rasterio import DatasetReader
+
+    from ..base.types import PathLike
 
 log = logging.getLogger(__name__)
 
@@ -22,6 +28,7 @@ MOST_POINTS = 25_000_000  # a point makes two facets; Scene.split has the same l
 LOWEST, HIGHEST = -1000.0, 9000.0  # m; land lies between -430 and 8849
 METRES = {"metre": 1.0, "meter": 1.0, "m": 1.0, "foot": 0.3048, "us survey foot": 1200 / 3937}
 WGS84 = "EPSG:4326"
+Geoid = str | Path | ArrayLike | Callable[[np.ndarray, np.ndarray], ArrayLike] | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,13 +41,19 @@ class Tile:
 
 
 def load(
-    path: Any, *, bounds: Any = None, heights: Any = None, geoid: Any = None, nodata: Any = None, external: Any = False
-) -> Tile:  # fmt: skip
+    path: PathLike,
+    *,
+    bounds: ArrayLike | None = None,
+    heights: str | None = None,
+    geoid: Geoid = None,
+    nodata: float | None = None,
+    external: bool = False,
+) -> Tile:
     """Points of an elevation model within bounds; arguments and errors as in Scene.from_dem."""
     path = arguments.path("path", path)
     name = f"DEM {path.name!r}"
     external = validation.flag("external", external)
-    with _opened(path, name, external) as file:
+    with _open_raster(path, name, external) as file:
         _check_place(file, name)
         above = _reference(file, name, heights, geoid)
         rows, columns = _window(file, name, bounds)
@@ -48,15 +61,16 @@ def load(
         longitude, latitude = _places(file, name, rows, columns)
     if above:
         height = height + undulation(geoid, longitude, latitude, name, above, external)
+    reference = f"{above} changed to the ellipsoid's" if above else "the ellipsoid"
     log.info(
-        "%s: %d x %d points, longitude %.5f to %.5f, latitude %.5f to %.5f, %d without data, heights above %s",
-        name, *height.shape, longitude.min(), longitude.max(), latitude.min(), latitude.max(),
-        np.isnan(height).sum(), f"{above} changed to the ellipsoid's" if above else "the ellipsoid",
-    )  # fmt: skip
+        f"{name}: {height.shape[0]} x {height.shape[1]} points, longitude {longitude.min():.5f} to "
+        f"{longitude.max():.5f}, latitude {latitude.min():.5f} to {latitude.max():.5f}, {np.isnan(height).sum()} "
+        f"without data, heights above {reference}"
+    )
     return Tile(longitude, latitude, height)
 
 
-def place(tile: Tile, frame: Any, center: Any) -> tuple[np.ndarray, np.ndarray]:
+def place(tile: Tile, frame: str, center: ArrayLike | None) -> tuple[np.ndarray, np.ndarray]:
     """Points and the ellipsoid's unit normals there, both (n_rows, n_columns, 3), in a frame of Scene.from_dem."""
     validation.choice("frame", frame, ("local", "ecef"))
     if frame == "ecef":
@@ -69,7 +83,7 @@ def place(tile: Tile, frame: Any, center: Any) -> tuple[np.ndarray, np.ndarray]:
     return points, wgs84.up(tile.longitude, tile.latitude) @ axes.T
 
 
-def local_frame(tile: Tile, center: Any) -> tuple[np.ndarray, np.ndarray]:
+def local_frame(tile: Tile, center: ArrayLike | None) -> tuple[np.ndarray, np.ndarray]:
     """Origin, m (3,), and axes east, north, up (3, 3) of the local frame of Scene.from_dem, in Earth-centred axes."""
     longitudes = tile.longitude
     if np.ptp(longitudes) > 180:  # across the antimeridian: counted from the first one
@@ -92,7 +106,7 @@ def local_frame(tile: Tile, center: Any) -> tuple[np.ndarray, np.ndarray]:
 
 
 @contextmanager
-def _opened(path: Path, name: str, external: bool) -> Iterator[Any]:
+def _open_raster(path: Path, name: str, external: bool) -> Iterator[DatasetReader]:
     """A raster, open for reading."""
     is_file = not path.is_dir()  # some formats are folders
     if is_file:
@@ -117,7 +131,7 @@ def _opened(path: Path, name: str, external: bool) -> Iterator[Any]:
             raise ValueError(f"{name} cannot be read ({exc}): it is damaged or no raster") from exc
 
 
-def _check_place(file: Any, name: str) -> None:
+def _check_place(file: DatasetReader, name: str) -> None:
     if file.crs is None or file.transform.is_identity:
         what = "CRS" if file.crs is None else "georeferencing"
         raise ValueError(
@@ -132,29 +146,29 @@ def _check_place(file: Any, name: str) -> None:
         raise ValueError(f"{name} has {file.height} x {file.width} points; a cell needs two in either direction")
 
 
-def _reference(file: Any, name: str, heights: Any, geoid: Any) -> str:
+def _reference(file: DatasetReader, name: str, heights: str | None, geoid: Geoid) -> str:
     """The geoid that heights are above, by its name; "" for the ellipsoid."""
     wkt = file.crs.to_wkt(version="WKT2_2019")
     vertical = re.search(r'VERTCRS\["([^"]+)"', wkt)
-    said = vertical[1] if vertical else "ellipsoid" if "CS[ellipsoidal,3]" in wkt else ""
+    stated = vertical[1] if vertical else "ellipsoid" if "CS[ellipsoidal,3]" in wkt else ""
     if heights is not None and not (isinstance(heights, str) and heights):
         raise ValueError(f"heights is {heights!r}; give 'ellipsoid' or the name of a geoid, such as 'EGM96'")
-    if heights is None and not said:
+    if heights is None and not stated:
         raise ValueError(
             f"{name} does not say what its heights are above; pass heights='ellipsoid', or the geoid's name "
             "(heights='EGM96' for SRTM, 'EGM2008' for Copernicus) with geoid=..."
         )
-    words = [re.sub(r"[\W_]|height|geoid", "", s.lower()) for s in (said, heights or said)]
+    words = [re.sub(r"[\W_]|height|geoid", "", s.lower()) for s in (stated, heights or stated)]
     ellipsoid = ["ellipsoid" in w for w in words]
-    if said and ellipsoid[0] != ellipsoid[1]:
-        raise ValueError(f"heights is {heights!r}, but {name} says that its heights are above {said!r}")
+    if stated and ellipsoid[0] != ellipsoid[1]:
+        raise ValueError(f"heights is {heights!r}, but {name} says that its heights are above {stated!r}")
     if ellipsoid[1]:
         if geoid is not None:
             raise ValueError(f"{name} has heights above the ellipsoid; geoid=... would count the undulation twice")
         return ""
     if words[0] and words[0] != words[1]:
-        log.info("%s says %r; its heights are taken above %r as asked", name, said, heights)
-    above = heights or said
+        log.info("%s says %r; its heights are taken above %r as asked", name, stated, heights)
+    above = heights or stated
     if geoid is None:
         raise ValueError(
             f"{name} has heights above {above!r}, not above the ellipsoid; give the undulation as geoid=...: a number "
@@ -163,7 +177,7 @@ def _reference(file: Any, name: str, heights: Any, geoid: Any) -> str:
     return above
 
 
-def _window(file: Any, name: str, bounds: Any) -> tuple[np.ndarray, np.ndarray]:
+def _window(file: DatasetReader, name: str, bounds: ArrayLike | None) -> tuple[np.ndarray, np.ndarray]:
     """Rows and columns of the points within bounds."""
     if bounds is None:
         low, high = np.zeros(2), np.array([file.height, file.width]) - 1
@@ -177,17 +191,19 @@ def _window(file: Any, name: str, bounds: Any) -> tuple[np.ndarray, np.ndarray]:
             )
         from rasterio.warp import transform_bounds
 
-        left, bottom, right, top = transform_bounds(WGS84, file.crs, *bounds) if _warped(file) else bounds
+        left, bottom, right, top = transform_bounds(WGS84, file.crs, *bounds) if _is_warped(file) else bounds
         t = ~file.transform
         corners = [(t.d * x + t.e * y + t.f, t.a * x + t.b * y + t.c) for x in (left, right) for y in (bottom, top)]
-        at = np.array(corners) - 0.5  # points are centres of pixels
-        low = np.maximum(np.ceil(at.min(axis=0) - 1e-6), 0)
-        high = np.minimum(np.floor(at.max(axis=0) + 1e-6), (file.height - 1, file.width - 1))
+        indices = np.array(corners) - 0.5  # points are centres of pixels
+        low = np.maximum(np.ceil(indices.min(axis=0) - 1e-6), 0)
+        high = np.minimum(np.floor(indices.max(axis=0) + 1e-6), (file.height - 1, file.width - 1))
     if (high - low < 1).any():
         from rasterio.warp import transform_bounds
 
-        there = ", ".join(f"{v:.5f}" for v in transform_bounds(file.crs, WGS84, *file.bounds))
-        raise ValueError(f"bounds hold no cell of {name}, which reaches over ({there}); check west, south, east, north")
+        extent = ", ".join(f"{v:.5f}" for v in transform_bounds(file.crs, WGS84, *file.bounds))
+        raise ValueError(
+            f"bounds hold no cell of {name}, which reaches over ({extent}); check west, south, east, north"
+        )
     shape = [int(b) - int(a) + 1 for a, b in zip(low, high, strict=True)]
     if shape[0] * shape[1] > MOST_POINTS:  # before there are lists of them
         raise MemoryError(
@@ -198,7 +214,7 @@ def _window(file: Any, name: str, bounds: Any) -> tuple[np.ndarray, np.ndarray]:
     return rows, columns
 
 
-def _heights(file: Any, name: str, rows: np.ndarray, columns: np.ndarray, nodata: Any) -> np.ndarray:
+def _heights(file: DatasetReader, name: str, rows: np.ndarray, columns: np.ndarray, nodata: float | None) -> np.ndarray:
     """Heights in metres, NaN where there are none."""
     from rasterio.windows import Window
 
@@ -225,13 +241,13 @@ def _heights(file: Any, name: str, rows: np.ndarray, columns: np.ndarray, nodata
     return np.where(missing, np.nan, height)
 
 
-def _places(file: Any, name: str, rows: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _places(file: DatasetReader, name: str, rows: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Longitude and latitude of points, degrees on WGS84 (n_rows, n_columns) each."""
     column, row = np.meshgrid(columns + 0.5, rows + 0.5)
     t = file.transform
     x, y = t.a * column + t.b * row + t.c, t.d * column + t.e * row + t.f
     longitude, latitude, off = x, y, np.zeros((2, 4))
-    if _warped(file):
+    if _is_warped(file):
         from rasterio.warp import transform
 
         longitude, latitude = (np.reshape(a, x.shape) for a in transform(file.crs, WGS84, x.ravel(), y.ravel()))
@@ -248,7 +264,7 @@ def _places(file: Any, name: str, rows: np.ndarray, columns: np.ndarray) -> tupl
     return longitude, latitude
 
 
-def _warped(file: Any) -> bool:
+def _is_warped(file: DatasetReader) -> bool:
     """True where coordinates are not degrees on WGS84 already."""
     wkt = file.crs.to_wkt()
     degrees = re.search(r'GEOGCS\[.*?UNIT\["degree"', wkt) is not None
@@ -256,14 +272,14 @@ def _warped(file: Any) -> bool:
 
 
 def undulation(
-    geoid: Any, longitude: np.ndarray, latitude: np.ndarray, name: str, above: str, external: bool = False
-) -> np.ndarray:  # fmt: skip
+    geoid: Geoid, longitude: np.ndarray, latitude: np.ndarray, name: str, above: str, external: bool = False
+) -> np.ndarray:
     """Height above the ellipsoid, m, of the geoid called `above`, at points, degrees (n_rows, n_columns)."""
     if isinstance(geoid, (str, Path)):
         return _raster(Path(geoid), longitude, latitude, external)
     if callable(geoid):
         geoid = geoid(longitude, latitude)
-    if np.ndim(geoid) == 0:
+    if geoid is None or np.ndim(geoid) == 0:
         value = validation.number("geoid", geoid)
         if value == 0:
             errors.warn(
@@ -277,9 +293,9 @@ def undulation(
 def _raster(path: Path, longitude: np.ndarray, latitude: np.ndarray, external: bool) -> np.ndarray:
     """A raster of undulations, in degrees, read bilinearly at points."""
     name = f"geoid {path.name!r}"
-    with _opened(path, name, external) as file:
+    with _open_raster(path, name, external) as file:
         _check_place(file, name)
-        if _warped(file):
+        if _is_warped(file):
             raise ValueError(f"{name} is not in degrees on WGS84; convert it (gdalwarp -t_srs EPSG:4326)")
         t = ~file.transform
         around = abs(file.width * file.transform.a - 360) < 1e-6  # columns cover all longitudes

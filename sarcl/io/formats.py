@@ -16,14 +16,21 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from importlib import import_module
 from pathlib import Path
-from typing import Any, Literal
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from ..base import arguments
 from . import input_paths
 
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+    from ..base.types import PathLike
+
 Kind = Literal["phase history", "image"]
 Written = Literal["phase history", "image", "picture"]
-Make = Callable[[Kind, Mapping[str, Any]], Any]
+T = TypeVar("T")
+Make = Callable[[Kind, Mapping[str, Any]], T]
 
 
 @dataclass(frozen=True)
@@ -46,7 +53,7 @@ class Format:
     by_blocks: bool = False
 
     @property
-    def functions(self) -> Any:
+    def functions(self) -> ModuleType:
         """The file of this folder that reads and writes the format."""
         return import_module(f".{self.file}", __package__)
 
@@ -57,9 +64,13 @@ class Format:
 
 
 HDF5 = Format(
-    (".h5", ".hdf5"), b"\x89HDF\r\n\x1a\n", "sarcl's own HDF5 files (raw.save, image.save)", "sarcl_hdf5",
-    writes=("phase history", "image"), by_blocks=True,
-)  # fmt: skip
+    (".h5", ".hdf5"),
+    b"\x89HDF\r\n\x1a\n",
+    "sarcl's own HDF5 files (raw.save, image.save)",
+    "sarcl_hdf5",
+    writes=("phase history", "image"),
+    by_blocks=True,
+)
 FORMATS = (
     Format((".png",), writes=("picture",)),
     HDF5,
@@ -71,22 +82,22 @@ NOT_READ = {  # first bytes of files that are often met, and what to say of them
 }
 
 
-def load(path: Path, make: Make, autofocus: bool = False, external: bool = False) -> Any:
-    """What make(kind, fields) makes of a file, whose format follows from its first bytes.
+def load(path: Path, make: Make[T], autofocus: bool = False, external: bool = False) -> T:
+    """The object that make(kind, fields) makes of a file, whose format follows from its first bytes.
 
     external  HDF5 files may lead into other files
     ValueError for a file that is of no known format, truncated or damaged, or a pipe; FileNotFoundError,
     IsADirectoryError, PermissionError.
     """
     head = input_paths.head(path, folder="give the files in it, e.g. sorted(Path(folder).glob('*.mat'))")
-    found = next((f for f in FORMATS if f.starts and head.startswith(f.starts)), None)
-    if found is not None:
-        return found.functions.load(path, make, autofocus, **({"external": True} if external and found is HDF5 else {}))
-    known = (text for starts, text in NOT_READ.items() if head.startswith(starts))
-    other = f"starts with {head[:12]!r}, which is no file kind sarcl knows" if head else "is empty"
-    promised = any(path.suffix.lower() in f.endings for f in FORMATS if f.starts)
-    although = f" although its name ends in {path.suffix!r}" if promised else ""
-    raise ValueError(f"{str(path)!r} {next(known, other)}{although}; sarcl reads {readable('and')}")
+    form = next((f for f in FORMATS if f.starts and head.startswith(f.starts)), None)
+    if form is not None:
+        return form.functions.load(path, make, autofocus, **({"external": True} if external and form is HDF5 else {}))
+    unreadable = (text for starts, text in NOT_READ.items() if head.startswith(starts))
+    unknown = f"starts with {head[:12]!r}, which is no file kind sarcl knows" if head else "is empty"
+    is_named_so = any(path.suffix.lower() in f.endings for f in FORMATS if f.starts)
+    although = f" although its name ends in {path.suffix!r}" if is_named_so else ""
+    raise ValueError(f"{str(path)!r} {next(unreadable, unknown)}{although}; sarcl reads {readable('and')}")
 
 
 def writing(*kinds: Written, by_blocks: bool = False) -> list[Format]:
@@ -108,28 +119,28 @@ def _listed(names: list[str], word: str) -> str:
     return f" {word} ".join([*([", ".join(names[:-1])] if names[1:] else []), names[-1]])
 
 
-def named(path: Any, among: list[Format]) -> Format | None:
+def named(path: PathLike, among: list[Format]) -> Format | None:
     """The format, of those given, that has the suffix of a path."""
     ending = Path(path).suffix.lower()
     return next((f for f in among if ending in f.endings), None)
 
 
-def ending_of(path: Any) -> str:
-    """How the name of a path ends, for messages: that it is a folder, its suffix, or that it has none."""
+def ending_of(path: PathLike) -> str:
+    """Words for the end of a path: that it is a folder, its suffix, or that it has none."""
     suffix = Path(path).suffix
     return "is a folder" if Path(path).is_dir() else f"ends in {suffix!r}" if suffix else "has no ending"
 
 
-def writer_functions(path: Any, kind: Written) -> Any:
+def writer_functions(path: PathLike, kind: Written) -> ModuleType:
     """Functions of the format in which `path` is written, by its suffix; ValueError where no format is written so."""
     among, path = writing(kind), arguments.path("path", path)
     form = named(path, among)
     if form is None:
-        wanted = suggested(among, "'")
-        raise ValueError(f"{kind} path {str(path)!r} {ending_of(path)}; sarcl writes a {kind} to {wanted}")
+        endings = suggested(among, "'")
+        raise ValueError(f"{kind} path {str(path)!r} {ending_of(path)}; sarcl writes a {kind} to {endings}")
     return form.functions
 
 
-def fields_of(value: Any) -> dict[str, Any]:
+def fields_of(value: DataclassInstance) -> dict[str, Any]:
     """The fields of a dataclass by name, as the writers take them; arrays are not copied."""
     return {field.name: getattr(value, field.name) for field in fields(value)}

@@ -4,21 +4,27 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+if TYPE_CHECKING:
+    import h5py
+
+    from ..base.report import Report
+    from ..base.types import WritableArray
 
 FORMAT = 1  # version of sarcl's HDF5 file
 BLOCK_BYTES = 2**24  # bytes of a block of rows, about
 
 
-def sign(file: Any, kind: str) -> None:
+def sign(file: h5py.File, kind: str) -> None:
     """Mark a file as sarcl's."""
     file.attrs["sarcl_file"] = kind
     file.attrs["format"] = FORMAT
 
 
-def blocks(dataset: Any) -> Iterator[tuple[int, int]]:
+def blocks(dataset: WritableArray) -> Iterator[tuple[int, int]]:
     """Row ranges (start, stop) of about BLOCK_BYTES each."""
     n = dataset.shape[0]
     row = max(1, int(np.prod(dataset.shape[1:], dtype=np.int64))) * dataset.dtype.itemsize
@@ -27,7 +33,7 @@ def blocks(dataset: Any) -> Iterator[tuple[int, int]]:
         yield a, min(a + step, n)
 
 
-def put(group: Any, name: str, value: Any) -> None:
+def put(group: h5py.Group, name: str, value: object) -> None:
     """A number or word as an attribute, an array as a dataset, None not at all."""
     import h5py
 
@@ -45,8 +51,8 @@ def put(group: Any, name: str, value: Any) -> None:
         group.create_dataset(name, data=value)
 
 
-def get(group: Any, name: str) -> Any:
-    """What `put` stored: a str, an int or float, an array, or None."""
+def get(group: h5py.Group, name: str) -> Any:
+    """Value that `put` stored: a str, an int or float, an array, or None."""
     import h5py
 
     if name in group.attrs:
@@ -59,8 +65,8 @@ def get(group: Any, name: str) -> Any:
     return group[name][...]
 
 
-def get_all(group: Any, leave: Sequence[str] = ()) -> dict[str, Any]:
-    """What `put` stored in a group, by name, except the names to leave; a group in it becomes a mapping."""
+def get_all(group: h5py.Group, leave: Sequence[str] = ()) -> dict[str, Any]:
+    """Values that `put` stored in a group, by name, except the names to leave; a group in it becomes a mapping."""
     import h5py
 
     names = [name for name in (*group.attrs, *group) if name not in leave]
@@ -68,20 +74,20 @@ def get_all(group: Any, leave: Sequence[str] = ()) -> dict[str, Any]:
     return {name: get_all(group[name]) if name in inside else get(group, name) for name in names}
 
 
-def put_report(file: Any, report: Any) -> None:
+def put_report(file: h5py.File, report: Report | None) -> None:
     """A report as a dataset of JSON text; None not at all."""
     if report is not None:  # a dataset: attributes end at 64 KB
         file["report"] = json.dumps(_plain(report.to_dict()))
 
 
-def get_report(file: Any) -> Any:
+def get_report(file: h5py.File) -> Report | None:
     """The report that `put_report` stored, or None."""
     from ..base.report import Report
 
     return Report(**_revive(json.loads(file["report"].asstr()[()]))) if "report" in file else None
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: object) -> object:
     """A value of a report in the types of JSON; a tuple is marked as one, any other type becomes its text."""
     if isinstance(value, Mapping):
         return {str(k): _plain(v) for k, v in value.items()}

@@ -43,13 +43,10 @@ def _is_deleted_here() -> bool:
     return False
 
 
-def contents(path: Path, what: str = "", most: int | None = None) -> bytes:
-    """All bytes of a file, after `check`; PermissionError names a file that cannot be read.
-
-    most  of a file with more bytes, one more than these is read
-    """
+def contents(path: Path, what: str = "") -> bytes:
+    """All bytes of a file, after `check`; PermissionError names a file that cannot be read."""
     check(path, what)
-    return _read(path, what, None if most is None else most + 1)
+    return _read(path, what, -1)
 
 
 def head(path: Path, what: str = "", folder: str = "give the name of a file in it") -> bytes:
@@ -58,10 +55,10 @@ def head(path: Path, what: str = "", folder: str = "give the name of a file in i
     return _read(path, what, 32)
 
 
-def _read(path: Path, what: str, most: int | None) -> bytes:
+def _read(path: Path, what: str, n_bytes: int) -> bytes:
     try:
         with open(path, "rb") as file:
-            return file.read(-1 if most is None else most)
+            return file.read(n_bytes)
     except OSError as exc:
         shown = f"{what} {str(path)!r}".strip()
         raise PermissionError(f"{shown} cannot be read: {exc.strerror}; check its permissions and its disk") from None

@@ -6,7 +6,7 @@ import io
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -22,6 +22,9 @@ from . import (
     _ply,
     input_paths,
 )
+
+if TYPE_CHECKING:
+    import trimesh
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +42,7 @@ class Mesh:
     unit: float | None = None
 
 
-def load(mesh: Any, repair: bool = True, external: bool = False) -> Mesh:
+def load(mesh: object, repair: bool = True, external: bool = False) -> Mesh:
     """A mesh file, a trimesh.Trimesh or a trimesh.Scene, its parts in place.
 
     repair  drop repeated faces, give neighbours one winding, face closed bodies outwards, but for walls of cavities in
@@ -55,8 +58,8 @@ def load(mesh: Any, repair: bool = True, external: bool = False) -> Mesh:
         what = f"mesh file {Path(mesh).name!r}"
         mesh = _read(Path(mesh), what, external)
     if isinstance(mesh, trimesh.Trimesh):
-        alone, mesh = mesh, trimesh.Scene()
-        mesh.add_geometry(alone, geom_name=alone.metadata.get("name"))
+        single, mesh = mesh, trimesh.Scene()
+        mesh.add_geometry(single, geom_name=single.metadata.get("name"))
     if not isinstance(mesh, trimesh.Scene):
         raise TypeError(f"{what} is a {type(mesh).__name__}; give a file name or a trimesh.Trimesh")
     vertices, faces, part, names = _parts(mesh, what)
@@ -70,45 +73,47 @@ def load(mesh: Any, repair: bool = True, external: bool = False) -> Mesh:
     return Mesh(vertices[faces], part[kept], names, closed, _unit(mesh, what))
 
 
-def _unit(scene: Any, what: str) -> float | None:
+def _unit(scene: trimesh.Scene, what: str) -> float | None:
     """Metres per unit of a trimesh.Scene, None where it names no unit; ValueError where its parts have several."""
     from trimesh.units import unit_conversion
 
-    named = {geometry.units for geometry in scene.geometry.values() if getattr(geometry, "units", None)}
-    if not named:
+    units = {geometry.units for geometry in scene.geometry.values() if getattr(geometry, "units", None)}
+    if not units:
         return None
-    found = {float(f"{unit_conversion(unit, 'meters'):.12g}") for unit in named}
-    if len(found) > 1:
-        raise ValueError(f"{what} has parts in several units ({', '.join(sorted(named))}); export it in one unit")
-    return found.pop()
+    lengths = {float(f"{unit_conversion(unit, 'meters'):.12g}") for unit in units}
+    if len(lengths) > 1:
+        raise ValueError(f"{what} has parts in several units ({', '.join(sorted(units))}); export it in one unit")
+    return lengths.pop()
 
 
-def _read(path: Path, what: str, external: bool) -> Any:
+def _read(path: Path, what: str, external: bool) -> trimesh.Scene:
     """The trimesh.Scene of a file, or of all meshes in an archive."""
     import trimesh
 
     input_paths.check(path, "mesh file")
-    known = sorted(trimesh.available_formats())
+    formats = sorted(trimesh.available_formats())
     kind = path.suffix.lower()
-    if kind.lstrip(".") not in known:
-        raise ValueError(f"{what}: unknown format {path.suffix!r}; known are {', '.join(known)}")
+    if kind.lstrip(".") not in formats:
+        raise ValueError(f"{what}: unknown format {path.suffix!r}; known are {', '.join(formats)}")
     if kind not in _mesh_archive.KINDS:
-        around = _other_files.Resolver(path, external)
-        made = _scene(input_paths.contents(path, "mesh file"), kind, path, what, around)
-        _check_refused(around, what)
-        return made
+        resolver = _other_files.Resolver(path, external)
+        scene = _scene(input_paths.contents(path, "mesh file"), kind, path, what, resolver)
+        _check_refused(resolver, what)
+        return scene
     files = _mesh_archive.contents(path, what)
     names = _mesh_archive.meshes(path, files, trimesh.exchange.load.mesh_formats(), what)
     scenes = []
     for name in names:
-        held = {other: io.BytesIO(data) for other, data in _mesh_archive.beside(files, name).items()}
-        others: Any = trimesh.resolvers.ZipResolver(held)
-        kind, of_it = Path(name).suffix.lower(), f"{what}, its file {name!r:.100}"
-        scenes.append(_scene(files[name], kind, None, of_it, others))
+        neighbours = {other: io.BytesIO(data) for other, data in _mesh_archive.beside(files, name).items()}
+        archive = trimesh.resolvers.ZipResolver(neighbours)
+        kind, label = Path(name).suffix.lower(), f"{what}, its file {name!r:.100}"
+        scenes.append(_scene(files[name], kind, None, label, archive))
     return trimesh.scene.scene.append_scenes(scenes) if len(scenes) > 1 else scenes[0]
 
 
-def _scene(data: bytes, kind: str, path: Path | None, what: str, others: Any) -> Any:
+def _scene(
+    data: bytes, kind: str, path: Path | None, what: str, others: trimesh.resolvers.Resolver | _other_files.Resolver
+) -> trimesh.Scene:
     """A trimesh.Scene of the bytes of a mesh file; ValueError for what would be left out or covered wrongly.
 
     path  gives the mesh its name, where it is a file;  others  gives trimesh the files that this one names
@@ -117,9 +122,9 @@ def _scene(data: bytes, kind: str, path: Path | None, what: str, others: Any) ->
 
     if kind == ".ply":
         vertices, faces = _ply.read(data, what)
-        made = trimesh.Scene()
-        made.add_geometry(trimesh.Trimesh(vertices, faces, process=False), geom_name=path.name if path else None)
-        return made
+        scene = trimesh.Scene()
+        scene.add_geometry(trimesh.Trimesh(vertices, faces, process=False), geom_name=path.name if path else None)
+        return scene
     declared = _mesh_checks.declared_faces(data, kind, what)
     if kind == ".off":
         _mesh_text.check_off(data, what)
@@ -129,13 +134,14 @@ def _scene(data: bytes, kind: str, path: Path | None, what: str, others: Any) ->
         _gltf_checks.check(data, what)
     elif kind == ".dae":
         _collada_checks.check_kind(data, what)
-    elif kind in _mesh_archive.ZIPPED:
-        _mesh_archive.check_size(data, what)
     try:
-        collada = _collada_checks.opened(data) if kind == ".dae" else None
+        collada = _collada_checks.open_document(data) if kind == ".dae" else None
         # process=False: merging and reordering corners is not needed and hides what the file holds
-        made = trimesh.load_scene(
-            io.BytesIO(data), file_type=str(path.absolute()) if path else kind[1:], process=False, resolver=others
+        scene = trimesh.load_scene(
+            io.BytesIO(data),
+            file_type=str(path.absolute()) if path else kind[1:],
+            process=False,
+            resolver=cast(trimesh.resolvers.Resolver, others),
         )
     except Exception as exc:
         if isinstance(others, _other_files.Resolver):
@@ -149,9 +155,9 @@ def _scene(data: bytes, kind: str, path: Path | None, what: str, others: Any) ->
         ) from exc
     if collada is not None:
         _collada_checks.check(collada, what)
-    held = sum(len(one.faces) for one in made.geometry.values() if isinstance(one, trimesh.Trimesh))
-    _mesh_checks.check_held(declared, held, what)
-    return made
+    n_faces = sum(len(one.faces) for one in scene.geometry.values() if isinstance(one, trimesh.Trimesh))
+    _mesh_checks.check_held(declared, n_faces, what)
+    return scene
 
 
 def _check_refused(others: _other_files.Resolver, what: str) -> None:
@@ -161,7 +167,7 @@ def _check_refused(others: _other_files.Resolver, what: str) -> None:
         )
 
 
-def _parts(scene: Any, what: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[tuple[str, ...]]]:
+def _parts(scene: trimesh.Scene, what: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[tuple[str, ...]]]:
     """Corners (n, 3), faces (k, 3), part of each face (k,), and the names of the parts."""
     import trimesh
 
@@ -188,7 +194,7 @@ def _parts(scene: Any, what: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, l
     return np.concatenate(vertices), np.concatenate(faces), np.concatenate(part), names
 
 
-def part_materials(material: Any, mesh: Mesh) -> dict[str, Any]:
+def part_materials(material: object, mesh: Mesh) -> dict[str, Any]:
     """Arguments of Scene.facets: one material for all, or {part: material} with "*" for the rest.
 
     A part goes by its node's name before its geometry's before its material's. ValueError names the parts there
@@ -196,17 +202,17 @@ def part_materials(material: Any, mesh: Mesh) -> dict[str, Any]:
     """
     if not isinstance(material, Mapping):
         return {"material": material}
-    known = {name for names in mesh.names for name in names}
-    there = "; ".join(" = ".join(map(repr, names)) for names in mesh.names)
+    part_names = {name for names in mesh.names for name in names}
+    parts_text = "; ".join(" = ".join(map(repr, names)) for names in mesh.names)
     for name in material:
-        if name not in known and name != "*":
-            raise ValueError(f"material names a part {name!r} that the mesh does not have; its parts are {there}")
+        if name not in part_names and name != "*":
+            raise ValueError(f"material names a part {name!r} that the mesh does not have; its parts are {parts_text}")
     choice = [next((name for name in (*names, "*") if name in material), None) for names in mesh.names]
-    for names, chosen in zip(mesh.names, choice, strict=True):
-        if chosen is None:
+    for names, name_used in zip(mesh.names, choice, strict=True):
+        if name_used is None:
             raise ValueError(
                 f"material does not say what the part {names[0]!r} is made of; name it or give '*' for the rest: the "
-                f"parts are {there}"
+                f"parts are {parts_text}"
             )
     words = list(dict.fromkeys(choice))
     place = np.array([words.index(c) for c in choice])

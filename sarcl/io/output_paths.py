@@ -9,9 +9,9 @@ import stat
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 from ..base.text import size_text
+from ..base.types import PathLike
 from . import _part
 from ._part import Part
 
@@ -20,7 +20,7 @@ LEAST_ROOM = 2**16  # bytes that must be free for a file whose size is not known
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
-def check_writable(path: Any, n_bytes: int = 0) -> Path:
+def check_writable(path: PathLike, n_bytes: int = 0) -> Path:
     """The file that `path` names, links followed, after a check that n_bytes can be written there.
 
     FileNotFoundError when the folder is missing, NotADirectoryError when the folder is a file,
@@ -62,7 +62,7 @@ def check_writable(path: Any, n_bytes: int = 0) -> Path:
     return target
 
 
-def place(path: Any) -> Path:
+def place(path: PathLike) -> Path:
     """The file that `path` names, links followed; FileNotFoundError where the current folder has been deleted."""
     try:
         return Path(os.path.realpath(os.fspath(path)))
@@ -73,7 +73,7 @@ def place(path: Any) -> Path:
         ) from None
 
 
-def no_room(path: Any, cause: OSError | None, n_bytes: float = 0, what: str = "it", more: str = "") -> OSError:
+def no_room(path: PathLike, cause: OSError | None, n_bytes: float = 0, what: str = "it", more: str = "") -> OSError:
     """The error of a full disk: the file, why, what it needs and what is free, and a remedy; more  said after that."""
     why = f"{cause.strerror}; " if cause is not None and cause.strerror else ""
     folder = next(each for each in place(path).parents if each.exists())  # it may have been deleted meanwhile
@@ -83,12 +83,12 @@ def no_room(path: Any, cause: OSError | None, n_bytes: float = 0, what: str = "i
     if cause is not None and cause.errno == errno.EFBIG:
         remedy = "raise the limit on files' sizes (ulimit -f)"
     number = errno.ENOSPC if cause is None else cause.errno
-    made = OSError(f"cannot write {str(path)!r}: {why}{what} {needs}; {remedy}{more}")
-    made.errno = number
-    return made
+    error = OSError(f"cannot write {str(path)!r}: {why}{what} {needs}; {remedy}{more}")
+    error.errno = number
+    return error
 
 
-def check_room(needs: Mapping[Any, float]) -> None:
+def check_room(needs: Mapping[PathLike, float]) -> None:
     """OSError where the disks have no room for all of some files: their paths, and about the bytes that each needs.
 
     For files that are written after the work, so that a full disk is told before it.
@@ -104,7 +104,7 @@ def check_room(needs: Mapping[Any, float]) -> None:
 
 
 @contextmanager
-def atomic(path: Any, n_bytes: int = 0, alone: bool = False) -> Iterator[Path]:
+def atomic(path: PathLike, n_bytes: int = 0, alone: bool = False) -> Iterator[Path]:
     """Yield a new, empty file beside `path`; on success it is moved to `path`, on any exception it is removed.
 
     alone  FileExistsError while another run writes a file for `path`; else the last one stays, whole
@@ -121,7 +121,7 @@ def atomic(path: Any, n_bytes: int = 0, alone: bool = False) -> Iterator[Path]:
         raise
 
 
-def begin(path: Any, n_bytes: int = 0, alone: bool = False) -> Part:
+def begin(path: PathLike, n_bytes: int = 0, alone: bool = False) -> Part:
     """A new, empty file beside `path`, to be committed or removed: `atomic` in steps.
 
     alone  FileExistsError while another run writes a file for `path`. Raises what `check_writable` raises.

@@ -10,15 +10,22 @@ come in and out; sarcl/model/store.py makes objects of them.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from . import _checksums, _hdf5_safety, hdf5
 from ._partial_hdf5 import Unfinished
-from .formats import Kind, Make
+from .formats import Kind, Make, T
+
+if TYPE_CHECKING:
+    import h5py
+    from numpy.typing import DTypeLike
+
+    from ..base.types import PathLike
 
 FILE_BYTES = 2**17  # bytes of all that is no row and no array: a waveform, a report, HDF5's own tables
 ROW_BYTES = 130  # bytes per row besides its samples: its geometry, numbers and the name of its polarisation
@@ -26,7 +33,7 @@ ROW_BYTES = 130  # bytes per row besides its samples: its geometry, numbers and 
 ROWS: dict[str, tuple[Kind, str]] = {"phase_history": ("phase history", "samples"), "image": ("image", "data")}
 
 
-def load(path: Any, make: Make, autofocus: bool = False, external: bool = False) -> Any:
+def load(path: PathLike, make: Make[T], autofocus: bool = False, external: bool = False) -> T:
     """make(kind, fields) of a file of sarcl's; samples or data stay in it as an h5py.Dataset that keeps it open.
 
     A group of the file is a mapping among the fields; what the file leaves out is no field. autofocus has no effect.
@@ -36,8 +43,8 @@ def load(path: Any, make: Make, autofocus: bool = False, external: bool = False)
     other files.
     """
     name = str(path)
-    sums = _checked(path)
-    file = _opened(path)
+    sums = _verify_checksums(path)
+    file = _open_file(path)
     try:
         try:
             mark, version = file.attrs.get("sarcl_file"), file.attrs.get("format")
@@ -50,10 +57,10 @@ def load(path: Any, make: Make, autofocus: bool = False, external: bool = False)
         kind, rows = ROWS[mark]
         try:
             _hdf5_safety.check_contents(file, Path(path).stat().st_size, external)
-            held = file[rows]
+            dataset = file[rows]
             if sums is not None and sums.rows is not None:
-                held = _with_checksums(held, sums)
-            fields = {**hdf5.get_all(file, leave=("report", rows)), rows: held, "report": hdf5.get_report(file)}
+                dataset = _with_checksums(dataset, sums)
+            fields = {**hdf5.get_all(file, leave=("report", rows)), rows: dataset, "report": hdf5.get_report(file)}
             return make(kind, fields)
         except _hdf5_safety.Refused as exc:
             raise ValueError(f"{name!r} {exc}") from None
@@ -68,19 +75,21 @@ def load(path: Any, make: Make, autofocus: bool = False, external: bool = False)
         raise
 
 
-def open_rows(path: Any, name: str) -> Any:
+def open_rows(path: PathLike, name: str) -> h5py.Dataset:
     """The dataset `name` of a file of sarcl's, or of another HDF5 file, with the checksums that the file has for it.
 
     ValueError where the file is damaged, OSError or KeyError where there is no such file or dataset.
     """
-    sums = _checked(path)
-    found = _opened(path)[name]
+    sums = _verify_checksums(path)
+    dataset = _open_file(path)[name]
     return (
-        found if sums is None or sums.rows is None or sums.rows[0] != name.strip("/") else _with_checksums(found, sums)
+        dataset
+        if sums is None or sums.rows is None or sums.rows[0] != name.strip("/")
+        else _with_checksums(dataset, sums)
     )
 
 
-def _checked(path: Any) -> _checksums.Checksums | None:
+def _verify_checksums(path: PathLike) -> _checksums.Checksums | None:
     """Checksums of a file after a check of all but its rows; one without checksums is tried in another process."""
     try:
         sums = _checksums.of(Path(path))
@@ -93,7 +102,7 @@ def _checked(path: Any) -> _checksums.Checksums | None:
     return sums
 
 
-def _opened(path: Any) -> Any:
+def _open_file(path: PathLike) -> h5py.File:
     import h5py
 
     try:
@@ -103,24 +112,47 @@ def _opened(path: Any) -> Any:
         raise ValueError(f"{str(path)!r} is {what} ({exc}); copy it again or give a file saved by sarcl") from None
 
 
-def _with_checksums(dataset: Any, sums: _checksums.Checksums) -> Any:
+def _with_checksums(dataset: h5py.Dataset, sums: _checksums.Checksums) -> h5py.Dataset:
     from ._checked_rows import CheckedRows
 
     return CheckedRows(dataset, sums)
 
 
-def job_of(path: Any) -> str | None:
+def job_of(path: PathLike) -> str | None:
     """The mark of the job that made an image file; None where there is no such file, or no mark in a whole file."""
     try:
-        _checked(path)
-        with _opened(path) as file:
+        _verify_checksums(path)
+        with _open_file(path) as file:
             job = file.attrs.get("job")
             return job if isinstance(job, str) else None
     except (OSError, KeyError, RuntimeError, ValueError):
         return None
 
 
-class ImageWriter:
+class _Writer:
+    """A file in the making, removed when a step of it fails."""
+
+    _unfinished: Unfinished
+
+    def abandon(self) -> None:
+        """Remove the unfinished file; `path` is as it was. Nothing happens after `close`."""
+        self._unfinished.abandon()
+
+    @contextmanager
+    def _abandoned_on_error(self) -> Iterator[None]:
+        try:
+            yield
+        except BaseException:
+            self.abandon()
+            raise
+
+    def _complete(self, fields: Mapping[str, Any]) -> None:
+        with self._unfinished.writing():
+            _put_fields(self._unfinished.file, fields)
+        self._unfinished.commit()
+
+
+class ImageWriter(_Writer):
     """An image file in the making, also for images larger than memory.
 
     grid   the fields of the ImageGrid by name; the image has the shape grid["shape"]
@@ -134,41 +166,31 @@ class ImageWriter:
     writes the same path.
     """
 
-    def __init__(self, path: Any, grid: Mapping[str, Any], dtype: Any = np.complex64, resumes: bool = False) -> None:
+    def __init__(
+        self, path: PathLike, grid: Mapping[str, Any], dtype: DTypeLike = np.complex64, resumes: bool = False
+    ) -> None:
         self.path, shape = Path(path), tuple(grid["shape"])
-        self._made = Unfinished(path, "image", math.prod(shape) * np.dtype(dtype).itemsize, resumes)
-        try:
-            with self._made.writing():
-                _put_group(self._made.file, "grid", grid)
-            self.data = self._made.dataset("data", shape, dtype)
-        except BaseException:
-            self.abandon()
-            raise
+        self._unfinished = Unfinished(path, "image", math.prod(shape) * np.dtype(dtype).itemsize, resumes)
+        with self._abandoned_on_error():
+            with self._unfinished.writing():
+                _put_group(self._unfinished.file, "grid", grid)
+            self.data = self._unfinished.dataset("data", shape, dtype)
 
     def mark(self, job: str) -> None:
         """Note which job made this file, for `job_of`."""
-        with self._made.writing():
-            self._made.file.attrs["job"] = job
+        with self._unfinished.writing():
+            self._unfinished.file.attrs["job"] = job
 
     def check_open(self) -> None:
         """ValueError where the file was finished or abandoned already."""
-        if not self._made.is_open:
+        if not self._unfinished.is_open:
             raise ValueError(f"the image file {str(self.path)!r} was finished or abandoned already")
 
     def close(self, fields: Mapping[str, Any]) -> None:
         """Complete the file with all fields of the image but data and grid, and move it to its path."""
         self.check_open()
-        try:
-            with self._made.writing():
-                _put_fields(self._made.file, fields)
-            self._made.commit()
-        except BaseException:
-            self.abandon()
-            raise
-
-    def abandon(self) -> None:
-        """Remove the unfinished file; `path` is as it was. Nothing happens after `close`."""
-        self._made.abandon()
+        with self._abandoned_on_error():
+            self._complete(fields)
 
     def __enter__(self) -> ImageWriter:
         return self
@@ -177,38 +199,26 @@ class ImageWriter:
         self.abandon()
 
 
-class EchoWriter:
+class EchoWriter(_Writer):
     """A file of echoes in the making: `samples` (n_rows, n_samples), zero until written; then `close` or `abandon`."""
 
-    def __init__(self, path: Any, n_rows: int, n_samples: int, dtype: Any = np.complex64) -> None:
+    def __init__(self, path: PathLike, n_rows: int, n_samples: int, dtype: DTypeLike = np.complex64) -> None:
         nbytes = n_rows * n_samples * np.dtype(dtype).itemsize
         self.path, self._row_bytes = Path(path), n_rows * ROW_BYTES
-        self._made = Unfinished(path, "phase_history", nbytes + self._row_bytes)
-        try:
-            self.samples = self._made.dataset("samples", (n_rows, n_samples), dtype)
-            self._made.reserve(nbytes + self._row_bytes)
-        except BaseException:
-            self.abandon()
-            raise
+        self._unfinished = Unfinished(path, "phase_history", nbytes + self._row_bytes)
+        with self._abandoned_on_error():
+            self.samples = self._unfinished.dataset("samples", (n_rows, n_samples), dtype)
+            self._unfinished.reserve(nbytes + self._row_bytes)
 
     def close(self, fields: Mapping[str, Any]) -> None:
         """Complete the file with all fields of the phase history but its samples, and move it to its path."""
-        try:
+        with self._abandoned_on_error():
             array = sum(np.size(value) for value in (fields["array"] or {}).values())
-            self._made.reserve(self._row_bytes + 16 * array + FILE_BYTES)
-            with self._made.writing():
-                _put_fields(self._made.file, fields)
-            self._made.commit()
-        except BaseException:
-            self.abandon()
-            raise
-
-    def abandon(self) -> None:
-        """Remove the unfinished file; `path` is as it was. Nothing happens after `close`."""
-        self._made.abandon()
+            self._unfinished.reserve(self._row_bytes + 16 * array + FILE_BYTES)
+            self._complete(fields)
 
 
-def _put_fields(file: Any, fields: Mapping[str, Any]) -> None:
+def _put_fields(file: h5py.File, fields: Mapping[str, Any]) -> None:
     """Write fields in the order given: a mapping as a group, the report as JSON, any other value as `hdf5.put` does."""
     for name, value in fields.items():
         if name == "report":
@@ -219,7 +229,7 @@ def _put_fields(file: Any, fields: Mapping[str, Any]) -> None:
             hdf5.put(file, name, value)
 
 
-def _put_group(file: Any, name: str, fields: Mapping[str, Any]) -> None:
+def _put_group(file: h5py.File, name: str, fields: Mapping[str, Any]) -> None:
     group = file.create_group(name)
     for field, value in fields.items():
         hdf5.put(group, field, value)

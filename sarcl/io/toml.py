@@ -6,7 +6,7 @@ import re
 import textwrap
 import tomllib
 from bisect import bisect_right
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 Path = tuple[str | int, ...]
@@ -20,8 +20,6 @@ _STRING = re.compile(r'"""(?:\\.|[^\\])*?"{3,5}' r"|'''.*?'{3,5}" r'|"(?:\\.|[^"
 _FLAT = re.compile(r"""\[[^\[\]{}"'#]*\]""")  # an array of numbers: nothing in it has a path of its own
 # an array of numbers as tomli-w writes it; strings hold no line end there
 _NUMBERS = re.compile(r"\[\n(?P<indent> +)(?P<values>[-+.\w]+(?:,\s+[-+.\w]+)*),\n *\]")
-_LONG = re.compile(r"[0-9][0-9_]{4200,}")  # Python's int takes 4300 digits
-_SHORTER = "where TOML has 64 bits: write a number with a decimal point or an exponent, 1e20"
 _SPACE = re.compile(r"(?:[ \t\r\n]|#[^\n]*)*")
 _ESCAPE = re.compile(r'\\(u[0-9A-Fa-f]{4}|U[0-9A-Fa-f]{8}|x[0-9A-Fa-f]{2}|[btnfre"\\])')
 _ESCAPED = {"b": "\b", "t": "\t", "n": "\n", "f": "\f", "r": "\r", "e": "\x1b", '"': '"', "\\": "\\"}
@@ -30,22 +28,11 @@ _ESCAPED = {"b": "\b", "t": "\t", "n": "\n", "f": "\f", "r": "\r", "e": "\x1b", 
 def tables(text: str, name: str) -> dict[str, Any]:
     """The tables of a TOML text; ValueError begins with `name`, the file, and the line where the text is no TOML."""
     try:
-        found = tomllib.loads(text)
-        integers = list(_integers((), found))
+        return tomllib.loads(text)
     except tomllib.TOMLDecodeError as exc:
         raise ValueError(_syntax(name, text, str(exc))) from None
     except RecursionError:
         raise too_deep(name) from None
-    except ValueError:  # of Python's int, which takes the square of the digits for many
-        match = _LONG.search(text)
-        line = f"{name}:{text.count(chr(10), 0, match.start()) + 1}" if match else name
-        raise ValueError(f"{line}: an integer of {len(match[0]) if match else 'many'} digits, {_SHORTER}") from None
-    for path, value in integers:
-        if not -(2**63) <= value < 2**63:
-            lines = locate(text.replace("\r\n", "\n"))
-            at = next(lines[path[:n]] for n in range(len(path), 0, -1) if path[:n] in lines)
-            raise ValueError(f"{name}:{at}: {path[-1]} is an integer of {value.bit_length()} bits, {_SHORTER}")
-    return found
 
 
 def too_deep(name: str) -> ValueError:
@@ -53,25 +40,13 @@ def too_deep(name: str) -> ValueError:
     return ValueError(f"{name}: arrays or tables lie hundreds deep in each other; write them flat")
 
 
-def _integers(path: Path, value: Any) -> Iterator[tuple[Path, int]]:
-    """All integers, with the paths of their keys; those of an array have that of the array."""
-    if isinstance(value, dict):
-        for key, inner in value.items():
-            yield from _integers((*path, key), inner)
-    elif isinstance(value, list):
-        for i, inner in enumerate(value):
-            yield from _integers((*path, i) if isinstance(inner, dict) else path, inner)
-    elif isinstance(value, int):
-        yield path, value
-
-
 def _syntax(name: str, text: str, message: str) -> str:
     """tomllib's message with file and line in front, the form that editors recognise."""
     match = re.search(r" \(at (?:line (\d+), column (\d+)|end of document)\)", message)
     line = int(match[1]) if match and match[1] else text.rstrip().count("\n") + 1
     column = f" (column {match[2]})" if match and match[2] else " (at the end)" if match else ""
-    said = message[: match.start()] if match else message
-    return f"{name}:{line}: {said}{column}; this is not valid TOML"
+    reason = message[: match.start()] if match else message
+    return f"{name}:{line}: {reason}{column}; this is not valid TOML"
 
 
 def locate(text: str) -> dict[Path, int]:
@@ -207,7 +182,7 @@ def dumps(tables: Mapping[str, Any]) -> str:
     return _NUMBERS.sub(_side_by_side, tomli_w.dumps(tables, indent=INDENT))
 
 
-def _check(value: Any, name: str) -> None:
+def _check(value: object, name: str) -> None:
     if isinstance(value, Mapping):
         for key, part in value.items():
             _check(part, f"{name}.{key}" if name else key)

@@ -13,10 +13,10 @@ def permutation(n: int) -> np.ndarray | None:
     """
     for p in range(n + 1, n + 5):
         if _is_prime(p):
-            for whole in _constructions(p):
-                found = _corner(whole, n)
-                if found is not None and is_costas(found):
-                    return found
+            for array in _constructions(p):
+                corner = _corner(array, n)
+                if corner is not None and is_costas(corner):
+                    return corner
     return None
 
 
@@ -47,15 +47,15 @@ def _constructions(p: int) -> list[np.ndarray]:
     power = np.ones(p - 1, np.int64)
     for i in range(1, p - 1):
         power[i] = power[i - 1] * g % p
-    out = [power - 1]
+    arrays = [power - 1]
     if p < 5:
-        return out
+        return arrays
     log = np.zeros(p, np.int64)
     log[power] = np.arange(p - 1)
     element = np.arange(2, p)
     primitive = np.gcd(log[element], p - 1) == 1
-    other = (1 - element) % p  # Golomb: alpha^i + beta^j = 1, so alpha + beta = 1 puts a point in the corner
-    pairs = element[primitive & (np.gcd(log[other], p - 1) == 1)]
+    partner = (1 - element) % p  # Golomb: alpha^i + beta^j = 1, so alpha + beta = 1 puts a point in the corner
+    pairs = element[primitive & (np.gcd(log[partner], p - 1) == 1)]
     square = [
         a for a in element[primitive].tolist() if (a * a + a) % p == 1
     ]  # two by two points in the corner (Taylor)
@@ -63,8 +63,8 @@ def _constructions(p: int) -> list[np.ndarray]:
     number = np.arange(1, p - 1)
     for a, b in chosen:
         rest = (1 - power[number * log[a] % (p - 1)]) % p
-        out.append(log[rest] * pow(int(log[b]), -1, p - 1) % (p - 1) - 1)
-    return out
+        arrays.append(log[rest] * pow(int(log[b]), -1, p - 1) % (p - 1) - 1)
+    return arrays
 
 
 def _corner(f: np.ndarray, n: int) -> np.ndarray | None:

@@ -20,10 +20,10 @@ def places(positions: ArrayLike) -> NDArray[np.float64]:
     validation.finite("positions", x)
     height = wgs84.geodetic(x)[2]
     if (height < DEEPEST).any():
-        at = np.unravel_index(int(np.argmin(height)), height.shape)
-        where = f"[{', '.join(str(int(i)) for i in at)}]" if at else ""
+        index = np.unravel_index(int(np.argmin(height)), height.shape)
+        shown = f"[{', '.join(str(int(i)) for i in index)}]" if index else ""
         raise ValueError(
-            f"positions{where} is {-height[at]:.4g} m under the ellipsoid; wanted Earth-fixed positions in m "
+            f"positions{shown} is {-height[index]:.4g} m under the ellipsoid; wanted Earth-fixed positions in m "
             "(local ones: see sarcl.wgs84.ecef and local_axes)"
         )
     return x

@@ -24,7 +24,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
+from typing import TYPE_CHECKING, Literal, NamedTuple, cast
 
 import numpy as np
 
@@ -34,113 +34,154 @@ from ..base.errors import warn
 from ..base.rows import spread_over
 from .waveform import Waveform
 
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from ..base.types import LazyRows
+
 BLOCK = 2**20  # samples per block of rows
-SOME_ROWS = 16  # rows in which the sign of the beat is checked
+BEAT_ROWS = 16  # rows in which the sign of the beat is checked
 BAND_STEPS = 2**16  # frequencies at which the spectrum of a chirp is taken
-LONGEST_DELAY = 1e9  # s
+LONGEST_DELAY = 1e9  # s, of a start: no echo takes as long
+ROUNDING = 1e-9  # relative difference of frequencies that count as equal
 KINDS = ("compressed", "dechirped", "chirped", "rf")
 LIGHT = Fraction(SPEED_OF_LIGHT)
 
 
-@dataclass(frozen=True, eq=False)
-class Spectra:
-    """samples (n_rows, n); frequency of sample 0, Hz (n_rows,); step, Hz; reference_range, m (n_rows,)."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TimeRecord:
+    """Arguments of PhaseHistory.from_time, which documents them, as the user gave them."""
+
+    samples: ArrayLike | LazyRows
+    kind: Literal["compressed", "dechirped", "chirped", "rf"]
+    rate: float
+    start: ArrayLike
+    carrier: ArrayLike | None
+    bandwidth: float | tuple[float, float] | None
+    waveform: Waveform | None
+    pulse_time: Literal["start", "middle"]
+    sweep_rate: float | None
+    beat: Literal["positive", "negative"] | None
+    reference_range: ArrayLike
+    scene_range: ArrayLike | None
+
+
+class Spectra(NamedTuple):
+    """Fields of a PhaseHistory: samples (n_rows, n); frequency, Hz (n_rows,); its step, Hz; reference, m (n_rows,)."""
 
     samples: np.ndarray
     frequency: np.ndarray
-    step: float
+    frequency_step: float
     reference_range: np.ndarray
 
 
-def spectra_of(
-    samples: Any, kind: Any, rate: Any, start: Any, carrier: Any, bandwidth: Any, waveform: Any, pulse_time: Any,
-    sweep_rate: Any, beat: Any, reference_range: Any, scene_range: Any,
-) -> tuple[Spectra, Waveform | None]:  # fmt: skip
-    """The arguments of PhaseHistory.from_time checked, and its samples over frequency; the waveform, or None."""
-    validation.choice("kind", kind, KINDS)
-    samples = _records(samples, kind)
-    n_rows, n = samples.shape
-    rate = validation.number("rate", rate, above=0)
+@dataclass(frozen=True, eq=False)
+class _Signal:
+    """Checked samples (n_rows, n) at a rate, Hz, with their axes of time and frequency.
+
+    start    s (n_rows,), of sample 0 after the transmission, or after the reference sweep passed `carrier`
+    carrier  Hz (n_rows,), mixed to 0, or to be mixed to 0 where is_rf
+    is_rf    whether samples are real ones of the received signal itself
+    """
+
+    samples: LazyRows
+    rate: float
+    start: np.ndarray
+    carrier: np.ndarray
+    is_rf: bool
+
+    @property
+    def n(self) -> int:
+        return self.samples.shape[1]
+
+
+@dataclass(frozen=True, eq=False)
+class _Sweep:
+    """The reference of dechirped samples.
+
+    rate       Hz/s, negative for a sweep that falls
+    beat       sign of the beat frequency of an echo behind the reference; None: real samples
+    reference  m (n_rows,), half the path of the reference sweep
+    scene      m (n_rows,): the new reference, at which no video phase remains; None: the filter is applied
+    """
+
+    rate: float
+    beat: str | None
+    reference: np.ndarray
+    scene: np.ndarray | None
+
+
+def spectra_of(record: TimeRecord) -> Spectra:
+    """The samples of a record over frequency; ValueError names a wrong argument, or one of another kind."""
+    validation.choice("kind", record.kind, KINDS)
+    samples = _checked_samples(record)
+    rate = validation.number("rate", record.rate, above=0)
+    waveform = record.waveform
     if waveform is not None:
         validation.instance("waveform", waveform, Waveform)
-    _check_meant(kind, bandwidth, pulse_time, sweep_rate, reference_range, scene_range)
-    band = None
-    if kind == "rf":
-        band = _rf_band(samples, rate, carrier, bandwidth, waveform, pulse_time)
-        carrier, bandwidth = sum(band) / 2, band[1] - band[0]
+    _check_kind(record)
+    is_rf = record.kind == "rf"
+    kind, carrier, bandwidth = record.kind, record.carrier, record.bandwidth
+    if is_rf:
+        low, high = _rf_band(record, samples, rate)
+        carrier, bandwidth = (low + high) / 2, high - low
         kind = "compressed" if waveform is None else "chirped"
-    if carrier is None and waveform is None:
-        raise ValueError("carrier is None and there is no waveform to take it from; give carrier=, Hz")
-    carrier = _each("carrier", waveform.center if carrier is None else carrier, n_rows)
-    if not (carrier > 0).all():
-        raise ValueError(f"carrier[{int(np.argmin(carrier))}] is {carrier.min():g} Hz; it must be positive")
-    start = _each("start", start, n_rows)
-    if np.abs(start).max() > LONGEST_DELAY:
-        raise ValueError(f"start reaches {np.abs(start).max():g} s, longer than any echo takes; give seconds")
+    n_rows = samples.shape[0]
+    carriers = _checked_carriers(carrier, waveform, n_rows)
+    signal = _Signal(samples, rate, _checked_starts(record.start, n_rows), carriers, is_rf)
     if kind == "dechirped":
-        if sweep_rate is None or not (sweep_rate := validation.number("sweep_rate", sweep_rate)):
-            raise ValueError("dechirped samples need sweep_rate=, Hz/s, not 0: negative where the frequency falls")
-        real = np.dtype(samples.dtype).kind != "c"
-        if real and beat is not None:
-            raise ValueError(f"beat is {beat!r}, but real samples have beats of both signs; leave it out")
-        if not real:
-            if beat is None:
-                raise ValueError(
-                    'complex dechirped samples need beat="positive" or "negative": the sign of the beat frequency of '
-                    "echoes behind the reference"
-                )
-            validation.choice("beat", beat, ("positive", "negative"))
-        reference = _each("reference_range", reference_range, n_rows)
-        scene = None if scene_range is None else _each("scene_range", scene_range, n_rows)
-        return of_beats(samples, rate, start, carrier, sweep_rate, beat, reference, scene), waveform
-    if beat is not None:
-        raise ValueError(f"beat is {beat!r}, but {kind} samples have no beat; leave it out")
-    if np.dtype(samples.dtype).kind != "c" and band is None:
-        raise ValueError(
-            f'{kind} samples must be complex, got {samples.dtype}; real samples of the received signal are kind="rf", '
-            "with bandwidth=(low, high), Hz"
-        )
-    if waveform is not None and np.ptp(carrier) == 0 and abs(waveform.center - carrier[0]) > 1e-9 * carrier[0]:
-        raise ValueError(
-            f"carrier is {carrier[0]:.9g} Hz but waveform.center {waveform.center:.9g} Hz; they must be one frequency"
-        )
+        return _dechirped(signal, _checked_sweep(record, signal))
+    _check_pulses(record, signal, kind)
     if kind == "chirped":
-        if waveform is None:
-            raise ValueError("chirped samples need waveform=, the pulse that was sent: Waveform.chirp or .sampled")
-        _check_rate(rate, waveform.bandwidth, "waveform.bandwidth")
-        sent = None if band is None else start
-        if pulse_time == "start":
-            start = start - waveform.duration / 2
-        factor: complex = 1 / (rate * float(np.sqrt(waveform.peak_energy_density)))
-        if waveform.sweep_rate is not None:  # that of exp(j pi K t^2) has a phase of pi/4 beside P
-            factor *= np.exp(-0.25j * np.pi * np.sign(waveform.sweep_rate)) / _in_band(waveform)
-        wanted = waveform.duration * rate
-        validation.room(f"a pulse of {wanted:.3g} samples", 32 * wanted, "check rate, Hz, and waveform.duration, s")
-        pad = int(np.ceil(wanted))
-        return of_pulses(samples, rate, start, carrier, waveform.bandwidth, factor, pad, sent), waveform
-    kept = rate if waveform is None else waveform.bandwidth
-    if bandwidth is not None:
-        kept = validation.number("bandwidth", bandwidth, above=0)
-    _check_rate(rate, kept, "bandwidth")
-    factor = kept / rate
-    if waveform is not None:  # the peak of the compressed pulse is the integral of its spectrum
-        f = waveform.center + (np.arange(4 * n) + 0.5 - 2 * n) * kept / (4 * n)
-        factor *= float(waveform.matched_spectrum(f).mean())
-    return of_pulses(samples, rate, start, carrier, kept, factor, sent=None if band is None else start), waveform
+        return _chirped(signal, waveform, record.pulse_time)
+    return _compressed(signal, waveform, bandwidth)
 
 
-def _rf_band(
-    samples: Any, rate: float, carrier: Any, bandwidth: Any, waveform: Waveform | None, pulse_time: Any
-) -> tuple[float, float]:
+def _checked_samples(record: TimeRecord) -> LazyRows:
+    """Samples as an array, or as given where they are read row by row; ValueError for another shape or type."""
+    if isinstance(record.samples, (list, tuple)):
+        validation.ndim("samples", record.samples)
+        samples: LazyRows = np.asarray(record.samples)
+    else:
+        samples = cast("LazyRows", record.samples)
+    if len(np.shape(samples)) != 2 or 0 in samples.shape:
+        raise ValueError(f"samples has shape {np.shape(samples)}, wanted (n_rows, n_times), neither zero")
+    if np.dtype(samples.dtype).kind not in "ciuf":
+        raise ValueError(f"samples has type {samples.dtype}, wanted numbers")
+    if samples.shape[1] < 2:
+        raise ValueError(f"samples has one time per row; {record.kind} records need at least 2")
+    return samples
+
+
+def _check_kind(record: TimeRecord) -> None:
+    """Raise ValueError for arguments of another kind."""
+    validation.choice("pulse_time", record.pulse_time, ("start", "middle"))
+    validation.ndim("reference_range", record.reference_range)
+    is_rf = record.kind == "rf"
+    for name, is_used, owner in (
+        ("bandwidth", record.bandwidth is not None and not is_rf, "compressed"),
+        ("pulse_time", record.pulse_time != "start" and not is_rf, "chirped"),
+        ("sweep_rate", record.sweep_rate is not None, "dechirped"),
+        ("reference_range", bool(np.any(np.asarray(record.reference_range) != 0)), "dechirped"),
+        ("scene_range", record.scene_range is not None, "dechirped"),
+    ):
+        if is_used and record.kind != owner:
+            raise ValueError(f"{name} is for {owner} samples, and kind is {record.kind!r}; leave it out")
+
+
+def _rf_band(record: TimeRecord, samples: LazyRows, rate: float) -> tuple[float, float]:
     """The band (low, high), Hz, of real samples of the signal itself."""
-    if np.dtype(samples.dtype).kind == "c":
+    waveform, bandwidth = record.waveform, record.bandwidth
+    if not _is_real(samples):
         raise ValueError(
             f'samples are {samples.dtype}, and kind "rf" is for real ones; complex ones are "compressed" or "chirped"'
         )
-    if carrier is not None:
+    if record.carrier is not None:
         raise ValueError("carrier is the middle of bandwidth=(low, high) where kind is 'rf'; leave it out")
-    if waveform is None and pulse_time != "start":
-        raise ValueError(f"pulse_time is {pulse_time!r}, and without waveform= samples are compressed; leave it out")
+    if waveform is None and record.pulse_time != "start":
+        raise ValueError(
+            f"pulse_time is {record.pulse_time!r}, and without waveform= samples are compressed; leave it out"
+        )
     if waveform is not None and bandwidth is not None:
         raise ValueError("bandwidth and waveform are both given, and the band is the waveform's; leave bandwidth out")
     if waveform is not None:
@@ -148,7 +189,7 @@ def _rf_band(
     elif bandwidth is None or validation.ndim("bandwidth", bandwidth) != 1:
         raise ValueError(f"bandwidth is {bandwidth!r:.60}; kind 'rf' needs bandwidth=(low, high), Hz")
     low, high = (float(f) for f in validation.array("bandwidth", bandwidth, np.float64, (2,)))
-    if not 0 < low < high <= rate / 2 * (1 + 1e-9):
+    if not 0 < low < high <= rate / 2 * (1 + ROUNDING):
         raise ValueError(
             f"bandwidth is ({low:g}, {high:g}) Hz; wanted 0 < low < high, and high at most half of rate, "
             f"{rate / 2:g} Hz"
@@ -156,7 +197,203 @@ def _rf_band(
     return low, high
 
 
-def _mixed(block: np.ndarray, rate: float, start: np.ndarray, carrier: np.ndarray) -> np.ndarray:
+def _checked_carriers(carrier: ArrayLike | None, waveform: Waveform | None, n_rows: int) -> np.ndarray:
+    """Carriers, Hz (n_rows,): the waveform's centre where none is given."""
+    if carrier is None and waveform is None:
+        raise ValueError("carrier is None and there is no waveform to take it from; give carrier=, Hz")
+    carriers = _per_row("carrier", waveform.center if waveform is not None and carrier is None else carrier, n_rows)
+    if not (carriers > 0).all():
+        raise ValueError(f"carrier[{int(np.argmin(carriers))}] is {carriers.min():g} Hz; it must be positive")
+    return carriers
+
+
+def _checked_starts(start: ArrayLike, n_rows: int) -> np.ndarray:
+    """Times of sample 0, s (n_rows,)."""
+    starts = _per_row("start", start, n_rows)
+    if np.abs(starts).max() > LONGEST_DELAY:
+        raise ValueError(f"start reaches {np.abs(starts).max():g} s, longer than any echo takes; give seconds")
+    return starts
+
+
+def _checked_sweep(record: TimeRecord, signal: _Signal) -> _Sweep:
+    """The reference sweep of dechirped samples; ValueError where its rate or the sign of the beat is missing."""
+    beat, n_rows = record.beat, len(signal.start)
+    rate = 0.0 if record.sweep_rate is None else validation.number("sweep_rate", record.sweep_rate)
+    if not rate:
+        raise ValueError("dechirped samples need sweep_rate=, Hz/s, not 0: negative where the frequency falls")
+    if _is_real(signal.samples):
+        if beat is not None:
+            raise ValueError(f"beat is {beat!r}, but real samples have beats of both signs; leave it out")
+    elif beat is None:
+        raise ValueError(
+            'complex dechirped samples need beat="positive" or "negative": the sign of the beat frequency of '
+            "echoes behind the reference"
+        )
+    else:
+        validation.choice("beat", beat, ("positive", "negative"))
+    reference = _per_row("reference_range", record.reference_range, n_rows)
+    scene = None if record.scene_range is None else _per_row("scene_range", record.scene_range, n_rows)
+    return _Sweep(rate, beat, reference, scene)
+
+
+def _check_pulses(record: TimeRecord, signal: _Signal, kind: str) -> None:
+    """Raise ValueError for samples of pulses that have a beat, no phase, or another carrier than their waveform."""
+    waveform, carrier = record.waveform, signal.carrier
+    if record.beat is not None:
+        raise ValueError(f"beat is {record.beat!r}, but {kind} samples have no beat; leave it out")
+    if _is_real(signal.samples) and not signal.is_rf:
+        raise ValueError(
+            f"{kind} samples must be complex, got {signal.samples.dtype}; real samples of the received signal are "
+            'kind="rf", with bandwidth=(low, high), Hz'
+        )
+    if waveform is not None and np.ptp(carrier) == 0 and abs(waveform.center - carrier[0]) > ROUNDING * carrier[0]:
+        raise ValueError(
+            f"carrier is {carrier[0]:.9g} Hz but waveform.center {waveform.center:.9g} Hz; they must be one frequency"
+        )
+
+
+def _is_real(samples: LazyRows) -> bool:
+    return np.dtype(samples.dtype).kind != "c"
+
+
+def _check_rate(rate: float, bandwidth: float, name: str) -> None:
+    if bandwidth > rate * (1 + ROUNDING):
+        raise ValueError(f"{name} is {bandwidth:g} Hz, but samples at {rate:g} Hz hold no more than that; check both")
+
+
+def _per_row(name: str, value: object, n_rows: int) -> np.ndarray:
+    """A number, or one per row, as float64 (n_rows,)."""
+    numbers = validation.converted(name, value, np.float64)
+    if numbers.shape not in ((), (n_rows,)):
+        raise ValueError(f"{name} has shape {numbers.shape}, wanted one number or one per row, ({n_rows},)")
+    validation.finite(name, numbers)
+    return np.array(np.broadcast_to(numbers, (n_rows,)))
+
+
+def _chirped(signal: _Signal, waveform: Waveform | None, pulse_time: str) -> Spectra:
+    """Spectra of echoes of the pulse as it was sent; the record is extended by zeros as long as the pulse, so that
+    pulses cut off by its ends do not wrap."""
+    if waveform is None:
+        raise ValueError("chirped samples need waveform=, the pulse that was sent: Waveform.chirp or .sampled")
+    _check_rate(signal.rate, waveform.bandwidth, "waveform.bandwidth")
+    delay = signal.start - waveform.duration / 2 if pulse_time == "start" else signal.start
+    factor: complex = 1 / (signal.rate * float(np.sqrt(waveform.peak_energy_density)))
+    if waveform.sweep_rate is not None:  # that of exp(j pi K t^2) has a phase of pi/4 beside P
+        factor *= np.exp(-0.25j * np.pi * np.sign(waveform.sweep_rate)) / _in_band(waveform)
+    n_pulse = waveform.duration * signal.rate
+    validation.room(f"a pulse of {n_pulse:.3g} samples", 32 * n_pulse, "check rate, Hz, and waveform.duration, s")
+    return _of_pulses(signal, delay, waveform.bandwidth, factor, n_zeros=int(np.ceil(n_pulse)))
+
+
+def _compressed(signal: _Signal, waveform: Waveform | None, bandwidth: float | tuple[float, float] | None) -> Spectra:
+    """Spectra of compressed pulses of peak 1."""
+    band = signal.rate if waveform is None else waveform.bandwidth
+    if bandwidth is not None:
+        band = validation.number("bandwidth", bandwidth, above=0)
+    _check_rate(signal.rate, band, "bandwidth")
+    factor = band / signal.rate
+    if waveform is not None:  # the peak of the compressed pulse is the integral of its spectrum
+        n = 4 * signal.n
+        f = waveform.center + (np.arange(n) + 0.5 - n / 2) * band / n
+        factor *= float(waveform.matched_spectrum(f).mean())
+    return _of_pulses(signal, signal.start, band, factor)
+
+
+def _of_pulses(signal: _Signal, delay: np.ndarray, bandwidth: float, factor: complex, n_zeros: int = 0) -> Spectra:
+    """Spectra of records in which every echo is a pulse: compressed or chirped.
+
+    delay      of sample 0, s (n_rows,), at which the middle of a pulse counts
+    bandwidth  Hz, of the frequencies to keep, about the carrier;  factor  of the spectra
+    n_zeros    samples by which the record is extended with zeros
+
+    The reference lies at the middle of the record, and is the same for rows of one start to the last bit.
+    """
+    n, rate, carrier = signal.n, signal.rate, signal.carrier
+    length = n + n_zeros
+    step = rate / length
+    n_bins = int(np.clip(round(bandwidth / step), 1, length))
+    lowest = -(n_bins - 1) / 2  # in steps, of the first frequency, from the carrier
+    reference = SPEED_OF_LIGHT / 2 * (delay + (n - 1) / (2 * rate))
+    carrier_cycles, offset = _carrier_phase(delay, carrier, reference)
+    shift = np.exp(-2j * np.pi * lowest / length * np.arange(n))
+
+    def spectra(block: np.ndarray, rows: slice) -> np.ndarray:
+        if signal.is_rf:
+            block = _mix_down(block, rate, signal.start[rows], carrier[rows])
+        bins = np.fft.fft(block * shift, length, axis=1)[:, :n_bins]
+        cycles = carrier_cycles[rows, None] - step * (lowest + np.arange(n_bins)) * offset[rows, None]
+        return np.asarray(factor * bins * np.exp(2j * np.pi * cycles))
+
+    frequency = carrier + lowest * step
+    _check_positive(
+        frequency, "the band reaches half the bandwidth below carrier; check bandwidth, rate and carrier, in Hz"
+    )
+    return Spectra(_by_rows(signal.samples, n_bins, spectra), frequency, step, reference)
+
+
+def _dechirped(signal: _Signal, sweep: _Sweep) -> Spectra:
+    """Spectra of dechirped records: their samples, in the order of frequency, without the residual video phase."""
+    n, rate, start, carrier = signal.n, signal.rate, signal.start, signal.carrier
+    is_rising = sweep.rate > 0
+    # receiver times conjugate reference has the beat frequency -K tau: the form of a phase history
+    is_conjugate = (sweep.beat != "negative") == is_rising
+    f = np.fft.fftfreq(n, 1 / rate)
+    one_side = _one_side(n)
+    video = np.exp(-1j * np.pi * f**2 / sweep.rate)
+    reference = sweep.reference if sweep.scene is None else sweep.scene
+    delay = np.zeros(len(start)) if sweep.scene is None else 2 * (sweep.scene - sweep.reference) / SPEED_OF_LIGHT
+    cycles, _ = _carrier_phase(start, carrier, reference)
+    sweep_cycles, _ = _carrier_phase(start, carrier, sweep.reference)
+    t = np.arange(n) / rate
+
+    def spectra(block: np.ndarray, rows: slice) -> np.ndarray:
+        if sweep.beat is None:
+            block = np.fft.ifft(np.fft.fft(block, axis=1) * one_side, axis=1)
+        if is_conjugate:
+            block = np.conj(block)
+        if sweep.scene is None:
+            block = np.fft.ifft(np.fft.fft(block, axis=1) * video, axis=1)
+        else:
+            d = delay[rows, None]
+            shift = (cycles - sweep_cycles)[rows, None] + sweep.rate * d * (start[rows, None] + t - d / 2)
+            block = block * np.exp(2j * np.pi * shift)
+        return block if is_rising else block[:, ::-1]
+
+    first_time = start - delay + (0.0 if is_rising else (n - 1) / rate)
+    frequency = carrier + sweep.rate * first_time
+    remedy = "start= and scene_range= are counted; check these, carrier (Hz) and sweep_rate (Hz/s)"
+    _check_positive(frequency, f"the sweep passes carrier at a time of 0, of which {remedy}")
+    spectrum = _by_rows(signal.samples, n, spectra)
+    if sweep.beat is not None and not sweep.reference.any():
+        _check_beat(spectrum, sweep.beat, float(np.median(delay)) * abs(sweep.rate) / rate)
+    return Spectra(spectrum, frequency, abs(sweep.rate) / rate, reference)
+
+
+def _check_positive(frequency: np.ndarray, why: str) -> None:
+    """ValueError for rows whose lowest frequency, Hz (n_rows,), is not positive."""
+    if not (frequency > 0).all():
+        row = int(np.argmin(frequency))
+        raise ValueError(f"row {row} would have frequencies from {frequency[row]:g} Hz; they must be positive: {why}")
+
+
+def _check_beat(samples: np.ndarray, beat: str, zero: float) -> None:
+    """Warn where most of the energy lies in front of the radar: the beat has the other sign.
+
+    zero  delay of the reference in periods of the window: echoes at no delay lie that far before it
+    """
+    n = samples.shape[1]
+    profiles = np.fft.ifft(samples[spread_over(len(samples), BEAT_ROWS)], axis=1)
+    power = np.roll((np.abs(profiles) ** 2).sum(axis=0), round(zero * n))
+    behind, before = float(power[2 : n // 2].sum()), float(power[n // 2 + 1 : -1].sum())  # without the leak at 0
+    if before > 4 * behind:
+        other = "negative" if beat == "positive" else "positive"
+        warn(
+            f"{before / (before + behind):.0%} of the energy lies at negative ranges, with beat={beat!r} and this sign "
+            f"of the sweep rate: give beat={other!r}, or the other sign of sweep_rate, unless the data show no echo"
+        )
+
+
+def _mix_down(block: np.ndarray, rate: float, start: np.ndarray, carrier: np.ndarray) -> np.ndarray:
     """The analytic signal of real rows (n_rows, n), its carrier, Hz (n_rows,), mixed to 0.
 
     start  s (n_rows,), of sample 0 after the transmission
@@ -168,10 +405,10 @@ def _mixed(block: np.ndarray, rate: float, start: np.ndarray, carrier: np.ndarra
 
 def _one_side(n: int) -> np.ndarray:
     """Weights (n,) of an FFT of real samples that leave the positive frequencies, twice: the analytic signal."""
-    out = 1.0 + np.sign(np.fft.fftfreq(n))
+    weights = 1.0 + np.sign(np.fft.fftfreq(n))
     if n % 2 == 0:
-        out[n // 2] = 1.0
-    return np.asarray(out)
+        weights[n // 2] = 1.0
+    return np.asarray(weights)
 
 
 def _in_band(chirp: Waveform) -> complex:
@@ -187,182 +424,29 @@ def _in_band(chirp: Waveform) -> complex:
     product = chirp.duration * chirp.bandwidth
     f = (np.arange(BAND_STEPS) + 0.5) / BAND_STEPS - 0.5
     (s1, c1), (s2, c2) = (fresnel(np.sqrt(2 * product) * (0.5 + side * f)) for side in (-1, 1))
-    made = complex((((c1 + c2) + 1j * (s1 + s2)) / (1 + 1j)).mean())
-    return made if chirp.kind == "chirp" else made.conjugate()
-
-
-def _check_meant(
-    kind: str, bandwidth: Any, pulse_time: Any, sweep_rate: Any, reference_range: Any, scene_range: Any
-) -> None:
-    """Raise ValueError for arguments of another kind."""
-    validation.choice("pulse_time", pulse_time, ("start", "middle"))
-    validation.ndim("reference_range", reference_range)
-    moved = np.any(np.asarray(reference_range) != 0)
-    for name, given, only in (
-        ("bandwidth", bandwidth is not None and kind != "rf", "compressed"),
-        ("pulse_time", pulse_time != "start" and kind != "rf", "chirped"),
-        ("sweep_rate", sweep_rate is not None, "dechirped"),
-        ("reference_range", bool(moved), "dechirped"),
-        ("scene_range", scene_range is not None, "dechirped"),
-    ):
-        if given and kind != only:
-            raise ValueError(f"{name} is for {only} samples, and kind is {kind!r}; leave it out")
-
-
-def _check_rate(rate: float, bandwidth: float, name: str) -> None:
-    if bandwidth > rate * (1 + 1e-9):
-        raise ValueError(f"{name} is {bandwidth:g} Hz, but samples at {rate:g} Hz hold no more than that; check both")
-
-
-def _records(samples: Any, kind: str) -> Any:
-    """Samples as an array, or as given where they are read row by row; ValueError for another shape or type."""
-    if isinstance(samples, (list, tuple)):
-        validation.ndim("samples", samples)
-        samples = np.asarray(samples)
-    if len(np.shape(samples)) != 2 or 0 in samples.shape:
-        raise ValueError(f"samples has shape {np.shape(samples)}, wanted (n_rows, n_times), neither zero")
-    if np.dtype(samples.dtype).kind not in "ciuf":
-        raise ValueError(f"samples has type {samples.dtype}, wanted numbers")
-    if samples.shape[1] < 2:
-        raise ValueError(f"samples has one time per row; {kind} records need at least 2")
-    return samples
-
-
-def _each(name: str, value: Any, n_rows: int) -> np.ndarray:
-    """A number, or one per row, as float64 (n_rows,)."""
-    out = validation.converted(name, value, np.float64)
-    if out.shape not in ((), (n_rows,)):
-        raise ValueError(f"{name} has shape {out.shape}, wanted one number or one per row, ({n_rows},)")
-    validation.finite(name, out)
-    return np.array(np.broadcast_to(out, (n_rows,)))
-
-
-def of_pulses(
-    samples: Any, rate: float, start: np.ndarray, carrier: np.ndarray, bandwidth: float, factor: complex, pad: int = 0,
-    sent: np.ndarray | None = None,
-) -> Spectra:  # fmt: skip
-    """Spectra of records in which every echo is a pulse: compressed or chirped.
-
-    start      delay of sample 0, s (n_rows,), at which the middle of a pulse counts;  carrier  Hz (n_rows,)
-    bandwidth  Hz, of the frequencies to keep, about the carrier;  factor  of the spectra
-    pad        samples by which the record is extended with zeros, so that pulses cut off by its ends do not wrap
-    sent       of real samples of the signal itself: s (n_rows,), of sample 0 after the transmission
-
-    The reference lies at the middle of the record, and is the same for rows of one start to the last bit.
-    """
-    n = samples.shape[1]
-    length = n + pad
-    step = rate / length
-    kept = int(np.clip(round(bandwidth / step), 1, length))
-    lowest = -(kept - 1) / 2  # in steps, of the first frequency kept, from the carrier
-    reference = SPEED_OF_LIGHT / 2 * (start + (n - 1) / (2 * rate))
-    cycles, offset = _carrier_phase(start, carrier, reference)
-    shift = np.exp(-2j * np.pi * lowest / length * np.arange(n))
-
-    def spectra(block: np.ndarray, rows: slice) -> np.ndarray:
-        if sent is not None:
-            block = _mixed(block, rate, sent[rows], carrier[rows])
-        made = np.fft.fft(block * shift, length, axis=1)[:, :kept]
-        turns = cycles[rows, None] - step * (lowest + np.arange(kept)) * offset[rows, None]
-        return np.asarray(factor * made * np.exp(2j * np.pi * turns))
-
-    lows = carrier + lowest * step
-    _check_positive(lows, "the band reaches half the bandwidth below carrier; check bandwidth, rate and carrier, in Hz")
-    return Spectra(_by_rows(samples, kept, spectra), lows, step, reference)
-
-
-def _check_positive(lowest: np.ndarray, why: str) -> None:
-    """ValueError for rows whose lowest frequency, Hz (n_rows,), is not positive."""
-    if not (lowest > 0).all():
-        row = int(np.argmin(lowest))
-        raise ValueError(f"row {row} would have frequencies from {lowest[row]:g} Hz; they must be positive: {why}")
-
-
-def of_beats(
-    samples: Any, rate: float, start: np.ndarray, carrier: np.ndarray, sweep_rate: float, beat: str | None,
-    reference: np.ndarray, scene: np.ndarray | None,
-) -> Spectra:  # fmt: skip
-    """Spectra of dechirped records: their samples, in the order of frequency, without the residual video phase.
-
-    start      s (n_rows,), of sample 0 after the reference sweep passed carrier, Hz (n_rows,)
-    sweep_rate Hz/s, negative for a sweep that falls;  reference  m (n_rows,), half the path of the reference sweep
-    beat       sign of the beat frequency of an echo behind the reference; None: real samples
-    scene      m (n_rows,): the new reference, at which no video phase remains; None: the filter is applied
-    """
-    n = samples.shape[1]
-    # receiver times conjugate reference has the beat frequency -K tau: the form of a phase history
-    flipped = (1 if beat in (None, "positive") else -1) == (1 if sweep_rate > 0 else -1)
-    f = np.fft.fftfreq(n, 1 / rate)
-    one_side = _one_side(n)
-    video = np.exp(-1j * np.pi * f**2 / sweep_rate) if scene is None else None
-    late = np.zeros(len(start)) if scene is None else 2 * (scene - reference) / SPEED_OF_LIGHT
-    cycles, _ = _carrier_phase(start, carrier, reference if scene is None else scene)
-    before, _ = _carrier_phase(start, carrier, reference)
-    t = np.arange(n) / rate
-
-    def spectra(block: np.ndarray, rows: slice) -> np.ndarray:
-        if beat is None:
-            block = np.fft.ifft(np.fft.fft(block, axis=1) * one_side, axis=1)
-        made = np.conj(block) if flipped else block
-        if video is not None:
-            made = np.fft.ifft(np.fft.fft(made, axis=1) * video, axis=1)
-        else:
-            d = late[rows, None]
-            turns = (cycles - before)[rows, None] + sweep_rate * d * (start[rows, None] + t - d / 2)
-            made = made * np.exp(2j * np.pi * turns)
-        return made if sweep_rate > 0 else made[:, ::-1]
-
-    first = start - late + (0.0 if sweep_rate > 0 else (n - 1) / rate)
-    lows = carrier + sweep_rate * first
-    _check_positive(
-        lows, "the sweep passes carrier at a time of 0, of which start= and scene_range= are counted; check these, "
-        "carrier (Hz) and sweep_rate (Hz/s)",
-    )  # fmt: skip
-    made = _by_rows(samples, n, spectra)
-    if beat is not None and not reference.any():
-        _check_beat(made, beat, 0 if scene is None else float(np.median(late)) * abs(sweep_rate) / rate)
-    moved = reference if scene is None else scene
-    return Spectra(made, lows, abs(sweep_rate) / rate, moved)
-
-
-def _check_beat(samples: np.ndarray, beat: str, zero: float) -> None:
-    """Warn where most of the energy lies in front of the radar: the beat has the other sign.
-
-    zero  delay of the reference in periods of the window: echoes at no delay lie that far before it
-    """
-    n = samples.shape[1]
-    some = samples[spread_over(len(samples), SOME_ROWS)]
-    power = (np.abs(np.fft.ifft(some, axis=1)) ** 2).sum(axis=0)
-    power = np.roll(power, round(zero * n))
-    behind, before = float(power[2 : n // 2].sum()), float(power[n // 2 + 1 : -1].sum())  # without the leak at 0
-    if before > 4 * behind:
-        other = "negative" if beat == "positive" else "positive"
-        warn(
-            f"{before / (before + behind):.0%} of the energy lies at negative ranges, with beat={beat!r} and this sign "
-            f"of the sweep rate: give beat={other!r}, or the other sign of sweep_rate, unless the data show no echo"
-        )
+    peak = complex((((c1 + c2) + 1j * (s1 + s2)) / (1 + 1j)).mean())
+    return peak if chirp.kind == "chirp" else peak.conjugate()
 
 
 def _carrier_phase(start: np.ndarray, carrier: np.ndarray, reference: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """fc tau_ref less whole cycles, and start - tau_ref, s, (n_rows,) each; exact until they are rounded to float64."""
-    known: dict[tuple[float, float, float], tuple[float, float]] = {}
-    out = np.empty((len(start), 2))
-    for row, key in enumerate(zip(start.tolist(), carrier.tolist(), reference.tolist(), strict=True)):
-        if key not in known:
-            delay = 2 * Fraction(key[2]) / LIGHT
-            known[key] = float(Fraction(key[1]) * delay % 1), float(Fraction(key[0]) - delay)
-        out[row] = known[key]
-    return out[:, 0], out[:, 1]
+    phases: dict[tuple[float, float, float], tuple[float, float]] = {}
+    rows = list(zip(start.tolist(), carrier.tolist(), reference.tolist(), strict=True))
+    for t, f, r in set(rows):
+        delay = 2 * Fraction(r) / LIGHT
+        phases[t, f, r] = float(Fraction(f) * delay % 1), float(Fraction(t) - delay)
+    cycles, offset = np.array([phases[row] for row in rows]).T
+    return cycles, offset
 
 
-def _by_rows(samples: Any, n: int, spectra: Callable[[np.ndarray, slice], np.ndarray]) -> np.ndarray:
+def _by_rows(samples: LazyRows, n: int, spectra: Callable[[np.ndarray, slice], np.ndarray]) -> np.ndarray:
     """The spectra (n_rows, n) of samples that are read in blocks of rows, complex128 where these are of 64 bits."""
-    given = np.dtype(samples.dtype)
-    single = given.kind in "iu" or given.itemsize <= (8 if given.kind == "c" else 4)
-    out = np.empty((len(samples), n), np.complex64 if single else np.complex128)
-    step = max(1, BLOCK // samples.shape[1])
-    for a in range(0, len(samples), step):
+    dtype, (n_rows, n_times) = np.dtype(samples.dtype), samples.shape
+    is_single = dtype.kind in "iu" or dtype.itemsize <= (8 if dtype.kind == "c" else 4)
+    spectrum = np.empty((n_rows, n), np.complex64 if is_single else np.complex128)
+    step = max(1, BLOCK // n_times)
+    for a in range(0, n_rows, step):
         block = np.asarray(samples[a : a + step])
         validation.finite("samples", block, first_row=a)
-        out[a : a + step] = spectra(block.astype(np.complex128), slice(a, a + step))
-    return validation.sealed(out)
+        spectrum[a : a + step] = spectra(block.astype(np.complex128), slice(a, a + step))
+    return validation.sealed(spectrum)

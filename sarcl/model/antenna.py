@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,11 +17,11 @@ Kind = Literal["isotropic", "aperture", "gaussian", "table"]
 TABLE = ("azimuth", "elevation", "values")  # fields of the kind "table"
 KINDS = ("isotropic", "aperture", "gaussian", "table")
 LEVEL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))  # mount of an antenna along the body's axes
-MOST_DECIBELS = 300.0  # of gains: the squares of both antennas' amplitudes stay within float32
+MOST_DECIBELS = 300.0  # largest gain, dB: the squares of both antennas' amplitudes stay within float32
 HEADER = 16  # floats before the coefficients of a table, as kernels/pattern.clh reads them
-ANGLE_ERROR = 5e-7  # rad, of float32 directions in antenna axes
-COSINE = 1e-5  # added to limits of direction cosines, which kernels compute in float32
-FLOAT_ERROR = 2e-6  # of the peak: rounding of float32 sines, exponentials and spline sums
+ANGLE_ERROR = 5e-7  # error of float32 directions in antenna axes, rad
+COSINE = 1e-5  # margin of limits of direction cosines, which kernels compute in float32
+FLOAT_ERROR = 2e-6  # error of gains over the peak: rounding of float32 sines, exponentials and spline sums
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -108,10 +108,8 @@ class Antenna:
         for name, kind in (("size", "aperture"), ("width", "gaussian"), *((n, "table") for n in TABLE)):
             if kind != self.kind and getattr(self, name) is not None:
                 raise ValueError(f"antenna {name} is of the kind {kind!r}, and kind is {self.kind!r}; leave it out")
-        if self.kind != "aperture" and validation.array("antenna taper", self.taper, np.float64, (2,)).tolist() != [
-            1,
-            1,
-        ]:
+        taper = validation.array("antenna taper", self.taper, np.float64, (2,))
+        if self.kind != "aperture" and (taper != 1).any():
             raise ValueError(f"antenna taper is of the kind 'aperture', and kind is {self.kind!r}; leave it out")
 
     def _check_table(self) -> None:
@@ -123,14 +121,16 @@ class Antenna:
                     f"antenna {name} must be at least 4 increasing angles, got {len(axis)}: {axis[:5].tolist()} ..."
                 )
             if np.ptp(step) > 1e-6 * step.mean():
-                at = int(np.argmax(np.abs(step - step.mean())))
+                index = int(np.argmax(np.abs(step - step.mean())))
                 raise ValueError(
-                    f"antenna {name}[{at + 1}] is {step[at]:g} rad after its neighbour, {step.mean():g} in the mean; "
-                    "a table needs even steps: interpolate it first"
+                    f"antenna {name}[{index + 1}] is {step[index]:g} rad after its neighbour, {step.mean():g} in the "
+                    "mean; a table needs even steps: interpolate it first"
                 )
             if np.abs(axis).max() > most * (1 + 1e-6):
-                worst = np.abs(axis).max()
-                raise ValueError(f"antenna {name} reaches {worst:g} rad, beyond {most:g}: were the angles in degrees?")
+                largest = np.abs(axis).max()
+                raise ValueError(
+                    f"antenna {name} reaches {largest:g} rad, beyond {most:g}: were the angles in degrees?"
+                )
             self._set(name, axis)
         shape = (len(self.azimuth), len(self.elevation))
         values = validation.array("antenna values", self.values, np.complex128, shape)
@@ -138,7 +138,7 @@ class Antenna:
             raise ValueError("antenna values are zero everywhere; some gain must be larger")
         self._set("values", validation.sealed(values / np.abs(values).max()))
 
-    def _set(self, name: str, value: Any) -> None:
+    def _set(self, name: str, value: object) -> None:
         object.__setattr__(self, name, value)
 
     @classmethod
@@ -223,7 +223,7 @@ class Antenna:
             raise ValueError(f"directions has shape {directions.shape}, wanted (..., 3)")
         return pattern_gain(self, directions, validation.number("frequency", frequency, above=0))
 
-    def ratio(self, frequency: float | np.ndarray) -> Any:
+    def ratio(self, frequency: float | np.ndarray) -> float | np.ndarray:
         """Factor by which angles are multiplied before the pattern is evaluated."""
         return 1.0 if self.frequency is None else frequency / self.frequency
 
@@ -263,32 +263,32 @@ class Antenna:
 
         frequency  Hz at which the kernel's `ratio` is 1.
         """
-        out = np.zeros(HEADER, np.float32)
-        out[0] = np.array(KINDS.index(self.kind), np.int32).view(np.float32)
+        numbers = np.zeros(HEADER, np.float32)
+        numbers[0] = np.array(KINDS.index(self.kind), np.int32).view(np.float32)
         shrinks = self.kind == "aperture" or self.frequency is not None
-        out[1:4] = self.amplitude, self.ratio(frequency), shrinks
+        numbers[1:4] = self.amplitude, self.ratio(frequency), shrinks
         if self.kind == "aperture":
-            out[4:6] = self.size * frequency / constants.SPEED_OF_LIGHT
-            out[6:8] = (1 - self.taper) / (1 + self.taper) / 2
+            numbers[4:6] = self.size * frequency / constants.SPEED_OF_LIGHT
+            numbers[6:8] = (1 - self.taper) / (1 + self.taper) / 2
         elif self.kind == "gaussian":
-            out[4:6] = np.sqrt(2 * np.log(2)) / self.width
+            numbers[4:6] = np.sqrt(2 * np.log(2)) / self.width
         elif self.kind == "table":
             for i, axis in enumerate((self.azimuth, self.elevation)):
-                out[4 + 2 * i : 6 + 2 * i] = axis[0], (len(axis) - 1) / (axis[-1] - axis[0])
-            out[8:10] = np.array(self.values.shape, np.int32).view(np.float32)
+                numbers[4 + 2 * i : 6 + 2 * i] = axis[0], (len(axis) - 1) / (axis[-1] - axis[0])
+            numbers[8:10] = np.array(self.values.shape, np.int32).view(np.float32)
             weights = uniform_spline(uniform_spline(self.values).T).T
-            return np.concatenate([out, np.ascontiguousarray(weights, np.complex64).view(np.float32).ravel()])
-        return out
+            return np.concatenate([numbers, np.ascontiguousarray(weights, np.complex64).view(np.float32).ravel()])
+        return numbers
 
 
-def pair_of(antenna: Any, bistatic: bool) -> tuple[Antenna, Antenna | None]:
+def pair_of(antenna: object, bistatic: bool) -> tuple[Antenna, Antenna | None]:
     """(transmitting, receiving) antennas from one Antenna or a pair; None for the second if the first is two-way."""
-    given = antenna if isinstance(antenna, (tuple, list)) else (antenna, antenna)
-    if len(given) != 2:
-        raise ValueError(f"antenna has {len(given)} entries; give an Antenna, or (transmitting, receiving)")
-    for one in given:
-        validation.instance("antenna", one, Antenna)
-    tx, rx = given
+    pair = antenna if isinstance(antenna, (tuple, list)) else (antenna, antenna)
+    if len(pair) != 2:
+        raise ValueError(f"antenna has {len(pair)} entries; give an Antenna, or (transmitting, receiving)")
+    for member in pair:
+        validation.instance("antenna", member, Antenna)
+    tx, rx = pair
     if not (tx.two_way or rx.two_way):
         return tx, rx
     if tx is not rx or bistatic:
@@ -296,10 +296,10 @@ def pair_of(antenna: Any, bistatic: bool) -> tuple[Antenna, Antenna | None]:
     return tx, None
 
 
-def _pair(name: str, value: Any) -> np.ndarray:
+def _pair(name: str, value: object) -> np.ndarray:
     if validation.ndim(name, value) == 0:
         value = np.full(2, validation.number(name, value))
-    out = validation.array(name, value, np.float64, (2,))
-    if not (out > 0).all():
-        raise ValueError(f"{name} is {out.tolist()}; both must be greater than 0")
-    return out
+    numbers = validation.array(name, value, np.float64, (2,))
+    if not (numbers > 0).all():
+        raise ValueError(f"{name} is {numbers.tolist()}; both must be greater than 0")
+    return numbers

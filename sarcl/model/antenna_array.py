@@ -51,26 +51,26 @@ class AntennaArray:
         if self.n > MOST:
             raise ValueError(f"array has {self.n} elements; at most {MOST} are possible: model groups as one element")
         self._set("offsets", validation.array("array offsets", self.offsets, np.float64, ("n_plans", self.n)))
-        given = np.ones(self.n) if self.weights is None else self.weights
-        self._set("weights", validation.array("array weights", given, np.complex128, (self.n,)))
+        weights = np.ones(self.n) if self.weights is None else self.weights
+        self._set("weights", validation.array("array weights", weights, np.complex128, (self.n,)))
         if not self.weights.any():
             raise ValueError("array weights are zero everywhere; some element must transmit")
         if self.plan is not None:
             plan = validation.array("array plan", self.plan, np.int64, ("n_pulses",))
-            bad = (plan < 0) | (plan >= len(self.offsets))
-            if bad.any():
-                at = int(np.argmax(bad))
-                raise ValueError(f"array plan[{at}] is {plan[at]}; offsets has rows 0 to {len(self.offsets) - 1}")
+            is_outside = (plan < 0) | (plan >= len(self.offsets))
+            if is_outside.any():
+                pulse = int(np.argmax(is_outside))
+                raise ValueError(f"array plan[{pulse}] is {plan[pulse]}; offsets has rows 0 to {len(self.offsets) - 1}")
             self._set("plan", plan)
 
-    def _set(self, name: str, value: Any) -> None:
+    def _set(self, name: str, value: object) -> None:
         object.__setattr__(self, name, value)
 
     def __repr__(self) -> str:
-        wide = np.linalg.norm(np.ptp(self.positions, axis=0))
+        extent = np.linalg.norm(np.ptp(self.positions, axis=0))
         plans = f", {len(self.offsets)} plans" if len(self.offsets) > 1 else ""
         return (
-            f"AntennaArray({self.n} elements over {wide:.4g} m, offsets {self.offsets.min():.4g} to "
+            f"AntennaArray({self.n} elements over {extent:.4g} m, offsets {self.offsets.min():.4g} to "
             f"{self.offsets.max():.4g} Hz{plans})"
         )
 
@@ -255,11 +255,11 @@ class AntennaArray:
         return float(np.ptp(self.centers))
 
 
-def _size(name: str, n: Any) -> int:
-    out = validation.count(name, n)
-    if out > MOST:
-        raise ValueError(f"{name} is {out}; an array has at most {MOST} elements")
-    return out
+def _size(name: str, n: object) -> int:
+    size = validation.count(name, n)
+    if size > MOST:
+        raise ValueError(f"{name} is {size}; an array has at most {MOST} elements")
+    return size
 
 
 def _towards(steer: ArrayLike) -> np.ndarray:

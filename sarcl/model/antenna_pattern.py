@@ -12,7 +12,7 @@ from ..base.vectors import unit
 if TYPE_CHECKING:
     from .antenna import Antenna
 
-SLACK = 1e-3  # of a table's step: directions outside the table by no more get the value at its edge
+SLACK = 1e-3  # distance to a table, in its steps, within which directions get the value at its edge
 
 
 def uniform_spline(values: np.ndarray) -> np.ndarray:
@@ -47,12 +47,12 @@ def table_limits(antenna: Antenna, level: float, ratio: float) -> tuple[float, f
     """Largest direction cosines along azimuth and elevation where a table reaches `level`; and -1 if never behind."""
     a, e = _fine(antenna.azimuth), _fine(antenna.elevation)
     power = sum(s(a, e) ** 2 for s in splines(antenna))
-    seen = power >= level**2
-    if not seen.any():
+    is_above = power >= level**2
+    if not is_above.any():
         return 0.0, 0.0, -1.0
     # margin: half a cell of the finer grid, between its samples, and rounding
-    azimuth = np.minimum(np.abs(a) / ratio + (a[1] - a[0]) / ratio, np.pi)[seen.any(axis=1)].max()
-    elevation = np.minimum(np.abs(e) / ratio + (e[1] - e[0]) / ratio, np.pi / 2)[seen.any(axis=0)].max()
+    azimuth = np.minimum(np.abs(a) / ratio + (a[1] - a[0]) / ratio, np.pi)[is_above.any(axis=1)].max()
+    elevation = np.minimum(np.abs(e) / ratio + (e[1] - e[0]) / ratio, np.pi / 2)[is_above.any(axis=0)].max()
     return float(np.sin(min(azimuth, np.pi / 2))), float(np.sin(elevation)), -float(azimuth < np.pi / 2)
 
 
@@ -118,18 +118,20 @@ def splines(antenna: Antenna) -> tuple[Any, Any]:
     """Bicubic (not-a-knot) splines of a table's real and imaginary parts over azimuth and elevation."""
     from scipy.interpolate import RectBivariateSpline
 
-    real, imag = (RectBivariateSpline(antenna.azimuth, antenna.elevation, v) for v in _parts(antenna.values))
+    real, imag = (
+        RectBivariateSpline(antenna.azimuth, antenna.elevation, v) for v in (antenna.values.real, antenna.values.imag)
+    )
     return real, imag
 
 
-def _parts(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    return values.real, values.imag
-
-
 def two_way_gain(
-    antennas: tuple[Antenna, Antenna | None], axes: tuple[np.ndarray, np.ndarray], tx: np.ndarray, rx: np.ndarray,
-    points: np.ndarray, frequency: float,
-) -> np.ndarray:  # fmt: skip
+    antennas: tuple[Antenna, Antenna | None],
+    axes: tuple[np.ndarray, np.ndarray],
+    tx: np.ndarray,
+    rx: np.ndarray,
+    points: np.ndarray,
+    frequency: float,
+) -> np.ndarray:
     """Transmit times receive gain (n_points,), one antenna pair: positions m (3,), axes (3, 3), points m (n, 3).
 
     antennas  from `antenna.pair_of`; d @ axes are the components of a direction d along the columns of axes

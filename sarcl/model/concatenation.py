@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from .antenna_array import AntennaArray
 from .lazy_rows import stack
 from .phase_history import PhaseHistory
+from .waveform import Waveform
 
 
 def concatenate(parts: Sequence[PhaseHistory]) -> PhaseHistory:
@@ -48,7 +50,7 @@ def concatenate(parts: Sequence[PhaseHistory]) -> PhaseHistory:
     return PhaseHistory(**joined, compressed=parts[0].compressed)
 
 
-def _alike(a: Any, b: Any) -> bool:
+def _alike(a: Waveform | AntennaArray | None, b: Waveform | AntennaArray | None) -> bool:
     """True where two waveforms (or None) have equal fields."""
     if a is None or b is None or type(a) is not type(b):
         return a is b

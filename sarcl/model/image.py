@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from ..base import arguments, validation
 from ..base.report import Report
@@ -22,11 +22,6 @@ if TYPE_CHECKING:
     from ..base.types import LazyRows, PathLike
 
 FRAMES = ("local", "earth-fixed")
-# all fields but data and grid, as files hold them
-FIELDS = (
-    "gain", "frequency", "tx", "rx", "report", "tx_velocity", "rx_velocity", "time", "band", "window", "polarization",
-    "frame", "aperture",
-)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +54,7 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
 
     data: Any
     grid: ImageGrid
-    gain: Any = 1.0
+    gain: float | NDArray[np.floating] = 1.0
     frequency: float | None = None
     tx: NDArray[np.float64] | None = None
     rx: NDArray[np.float64] | None = None
@@ -127,11 +122,11 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
     __ne__ = object.__ne__
     __hash__ = object.__hash__
 
-    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
-        made = np.asarray(self.data, dtype)
-        return np.array(made) if copy else made
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> np.ndarray:
+        pixels = np.asarray(self.data, dtype)
+        return np.array(pixels) if copy else pixels
 
-    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **options: Any) -> Any:
+    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: object, **options: object) -> Any:
         return getattr(ufunc, method)(*(np.asarray(i) if isinstance(i, Image) else i for i in inputs), **options)
 
     def __len__(self) -> int:
@@ -182,8 +177,8 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
         """20 log10 |data/gain| (10 log10 of an intensity over gain^2), dB, float32; -inf where data is 0."""
         data = np.asarray(self.data)
         if not self.is_complex and (data < 0).any():
-            at = [int(i) for i in np.unravel_index(int(np.argmin(data)), data.shape)]
-            raise ValueError(f"image data{at} is {data.min():g}; an intensity is not negative")
+            pixel = [int(i) for i in np.unravel_index(int(np.argmin(data)), data.shape)]
+            raise ValueError(f"image data{pixel} is {data.min():g}; an intensity is not negative")
         gain = np.where(self.gain > 0, self.gain, 1) if isinstance(self.gain, np.ndarray) else self.gain
         with np.errstate(divide="ignore"):
             if self.is_complex:
@@ -213,7 +208,7 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
         gain = self.gain
         if isinstance(gain, np.ndarray):
             gain = np.sqrt(mean(gain[: rows * a, : columns * b] ** 2))
-        return replace(self, data=mean(power), grid=_looked(self.grid, a, b), gain=gain)
+        return replace(self, data=mean(power), grid=_multilooked_grid(self.grid, a, b), gain=gain)
 
     def show(
         self,
@@ -257,20 +252,20 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
                                       Description say what white and black are;  title  above the picture
         On any exception `path` is as it was.
         """
-        among = formats.writing("picture", "image")
-        form = formats.named(arguments.path("path", path), among)
+        image_formats = formats.writing("picture", "image")
+        form = formats.named(arguments.path("path", path), image_formats)
         if form is None:
-            wanted = formats.suggested(among, "'")
-            raise ValueError(f"image path {str(path)!r} {formats.ending_of(path)}; choose {wanted}")
+            endings = formats.suggested(image_formats, "'")
+            raise ValueError(f"image path {str(path)!r} {formats.ending_of(path)}; choose {endings}")
         if form.is_picture:
             from ..figures.decibels import write_png
 
             write_png(self._picture(floor_db, top_db, percentile, title), path)
             return
-        with form.functions.ImageWriter(path, formats.fields_of(self.grid), self.data.dtype) as out:
-            for a, b in hdf5.blocks(out.data):
-                out.data[a:b] = np.asarray(self.data[a:b])
-            out.close(image_fields(self))
+        with form.functions.ImageWriter(path, formats.fields_of(self.grid), self.data.dtype) as writer:
+            for a, b in hdf5.blocks(writer.data):
+                writer.data[a:b] = np.asarray(self.data[a:b])
+            writer.close(image_fields(self))
 
     def _picture(
         self, floor_db: float, top_db: float | None = None, percentile: float | None = None, title: str | None = None
@@ -299,28 +294,39 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
             i, j = np.unravel_index(int(np.argmin(db < np.inf)), db.shape)
             raise ValueError(f"image data[{i}, {j}] is {np.asarray(self.data)[i, j]}; a picture needs finite pixels")
         return picture(
-            db, spacing, floor_db, title, top_db=top_db, percentile=percentile,
-            zero="a unit point in focus", origin=origin, names=names,
-        )  # fmt: skip
+            db,
+            spacing,
+            floor_db,
+            title,
+            top_db=top_db,
+            percentile=percentile,
+            zero="a unit point in focus",
+            origin=origin,
+            names=names,
+        )
 
 
-def _checked_gain(gain: Any, grid: ImageGrid) -> float | NDArray[np.floating]:
+FIELDS = tuple(f.name for f in fields(Image) if f.name not in ("data", "grid"))  # as files hold them
+
+
+def _checked_gain(gain: object, grid: ImageGrid) -> float | NDArray[np.floating]:
     """A gain as a number, or as a read-only array of the grid's shape; ValueError for one that cannot be."""
     if validation.ndim("image gain", gain) == 0:
         return validation.number("image gain", gain, above=0)
     kind = np.float32 if getattr(gain, "dtype", None) == np.float32 else np.float64
-    own = isinstance(gain, np.ndarray) and gain.dtype == kind and not gain.flags.writeable and gain.shape == grid.shape
-    made = gain if own else validation.array("image gain", gain, kind, tuple(grid.shape))
-    low = float(made.min())
-    if low < 0 or not np.isfinite(low) or not 0 < float(made.max()) < np.inf:
+    gains = gain if isinstance(gain, np.ndarray) and gain.dtype == kind and gain.shape == grid.shape else None
+    if gains is None or gains.flags.writeable:
+        gains = validation.array("image gain", gain, kind, tuple(grid.shape))
+    low = float(gains.min())
+    if low < 0 or not np.isfinite(low) or not 0 < float(gains.max()) < np.inf:
         raise ValueError(
-            f"image gain is {low:g} to {made.max():g}; it is a sum of weights, 0 where no row saw a pixel, and greater "
-            "than 0 elsewhere"
+            f"image gain is {low:g} to {gains.max():g}; it is a sum of weights, 0 where no row saw a pixel, and "
+            "greater than 0 elsewhere"
         )
-    return made
+    return gains
 
 
-def _looked(grid: ImageGrid, a: int, b: int) -> ImageGrid:
+def _multilooked_grid(grid: ImageGrid, a: int, b: int) -> ImageGrid:
     """The grid of means over blocks of (a, b) pixels: the mean of a block lies at the mean position of its pixels."""
     rows, columns = grid.shape[0] // a, grid.shape[1] // b
     if grid.spacing is not None:

@@ -6,7 +6,7 @@ import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -60,18 +60,16 @@ class ImageGrid:
                 )
         for name in ("center", "x_axis", "y_axis", "listed", "times", "ranges"):
             value = getattr(self, name)
-            if value is not None and (not isinstance(value, np.ndarray) or value.flags.writeable):
-                axes: tuple[int | str, ...] = ("n",) if name in ("times", "ranges") else (3,)
-                made = (
-                    _cells(validation.converted(name, value, np.float64))
-                    if name == "listed"
-                    else validation.array(name, value, np.float64, axes)
-                )
-                object.__setattr__(self, name, made)
+            if value is None or (isinstance(value, np.ndarray) and not value.flags.writeable):
+                continue
+            if name == "listed":
+                array = _cells(validation.converted(name, value, np.float64))
+            else:
+                array = validation.array(name, value, np.float64, ("n",) if name in ("times", "ranges") else (3,))
+            object.__setattr__(self, name, array)
         if self.spacing is not None:
-            steps = pair("spacing", self.spacing)
-            made_steps = [validation.number(f"spacing[{i}]", d, above=0) for i, d in enumerate(steps)]
-            object.__setattr__(self, "spacing", (made_steps[0], made_steps[1]))
+            steps = enumerate(pair("spacing", self.spacing))
+            object.__setattr__(self, "spacing", tuple(validation.number(f"spacing[{i}]", d, above=0) for i, d in steps))
             if len(self.shape) != 2 or self.center is None or self.x_axis is None or self.y_axis is None:
                 raise ValueError(
                     f"a plane has a shape of two axes, center, x_axis and y_axis, got shape {self.shape}; make it with "
@@ -104,7 +102,7 @@ class ImageGrid:
         if np.linalg.norm(x) < 1e-6:
             raise ValueError(f"x_axis {_text(x_axis)} is along the normal {_text(n)}; give one that lies in the plane")
         x /= np.linalg.norm(x)
-        made = cls(
+        grid = cls(
             shape=(_side("shape[0]", rows), _side("shape[1]", columns)),
             center=center,
             spacing=(validation.number("spacing[0]", dy, above=0), validation.number("spacing[1]", dx, above=0)),
@@ -112,13 +110,14 @@ class ImageGrid:
             y_axis=np.cross(n, x),
         )
         with np.errstate(over="ignore", invalid="ignore"):
-            far = not (np.abs(made.bounds) < FARTHEST).all()
+            far = not (np.abs(grid.bounds) < FARTHEST).all()
         if far:
+            assert grid.spacing is not None
             raise ValueError(
-                f"pixels of center {_text(center)} and spacing {_text(made.spacing)} reach beyond {FARTHEST:g} m, "
+                f"pixels of center {_text(center)} and spacing {_text(grid.spacing)} reach beyond {FARTHEST:g} m, "
                 "where distances overflow; give both in metres"
             )
-        return made
+        return grid
 
     @classmethod
     def points(cls, positions: ArrayLike, *, valid: ArrayLike | None = None) -> ImageGrid:
@@ -186,16 +185,16 @@ class ImageGrid:
 
         Both axes must be evenly spaced: ValueError where they are not, or do not fit the positions.
         """
-        made = cls.points(positions)
+        grid = cls.points(positions)
         axes = []
-        for name, value, n in (("times", times, made.shape[0]), ("ranges", ranges, made.shape[-1])):
+        for name, value, n in (("times", times, grid.shape[0]), ("ranges", ranges, grid.shape[-1])):
             axis = validation.array(name, value, np.float64, (n,))
             steps = np.diff(axis)
             rounding = 4 * float(np.spacing(np.abs(axis).max())) if n > 2 else 0.0  # of absolute times
             if not (steps > 0).all() or (n > 2 and np.ptp(steps) > 1e-6 * steps.mean() + rounding):
                 raise ValueError(f"{name} must increase in even steps; give one per row (times) or column (ranges)")
             axes.append(axis)
-        return replace(made, times=axes[0], ranges=axes[1])
+        return replace(grid, times=axes[0], ranges=axes[1])
 
     def on_earth(self, longitude: float, latitude: float, height: float = 0.0) -> ImageGrid:
         """This grid, in x east, y north, z up of a place, in Earth-fixed coordinates: see `Scene.on_earth`."""
@@ -232,7 +231,7 @@ class ImageGrid:
 
     def columns(self, start: int, stop: int) -> ImageGrid:
         """Columns start ... stop - 1 of a plane, with the same positions to the bit."""
-        self._need_plane("columns")
+        self._plane("columns")
         start, stop = validation.count("start", start, None), validation.count("stop", stop, None)
         if not 0 <= start < stop <= self.shape[1]:
             raise IndexError(f"columns {start} to {stop} were requested, of {self.shape[1]}; start must be below stop")
@@ -245,27 +244,31 @@ class ImageGrid:
 
         IndexError where a step is not positive or nothing is left.
         """
-        taken = []
-        for axis, (n, one) in enumerate(zip(self.shape, (*slices, *[slice(None)] * len(self.shape)), strict=False)):
-            if not isinstance(one, slice):
-                raise IndexError(f"slices[{axis}] is {one!r:.60}; give a slice for each axis, such as numpy.s_[2:5]")
-            arguments.checked_index(f"slices[{axis}]", "a grid", one, (n,))
-            found = range(*one.indices(n))
-            if found.step < 0:
-                raise IndexError(f"axis {axis} of a grid is sliced with a step of {found.step}; steps are positive")
-            if len(found) == 0:
+        ranges = []
+        for axis, (n, selection) in enumerate(
+            zip(self.shape, (*slices, *[slice(None)] * len(self.shape)), strict=False)
+        ):
+            if not isinstance(selection, slice):
+                raise IndexError(
+                    f"slices[{axis}] is {selection!r:.60}; give a slice for each axis, such as numpy.s_[2:5]"
+                )
+            arguments.checked_index(f"slices[{axis}]", "a grid", selection, (n,))
+            pixels = range(*selection.indices(n))
+            if pixels.step < 0:
+                raise IndexError(f"axis {axis} of a grid is sliced with a step of {pixels.step}; steps are positive")
+            if len(pixels) == 0:
                 raise IndexError(f"no pixel is left of the {n} of axis {axis}; choose at least one")
-            taken.append(found)
-        shape = tuple(map(len, taken))
+            ranges.append(pixels)
+        shape = tuple(map(len, ranges))
         if self.spacing is not None:
-            rows, columns = taken
+            rows, columns = ranges
             center = self.at(rows.start + rows.step * (shape[0] // 2), columns.start + columns.step * (shape[1] // 2))
             spacing = self.spacing[0] * rows.step, self.spacing[1] * columns.step
             return replace(self, shape=shape, center=validation.sealed(center), spacing=spacing)
         assert self.listed is not None
-        listed = self.listed[tuple(slice(r.start, r.stop, r.step) for r in taken)]
+        listed = self.listed[tuple(slice(r.start, r.stop, r.step) for r in ranges)]
         if self.times is not None and self.ranges is not None:
-            return ImageGrid.zero_doppler(self.times[list(taken[0])], self.ranges[list(taken[1])], listed)
+            return ImageGrid.zero_doppler(self.times[list(ranges[0])], self.ranges[list(ranges[1])], listed)
         return ImageGrid.points(listed)
 
     @property
@@ -282,17 +285,14 @@ class ImageGrid:
     def extent(self) -> tuple[float, float, float, float]:
         """Edges of a plane's pixels along x_axis and y_axis, m: (left, right, bottom, top)."""
         x, y = self.x, self.y
-        assert self.spacing is not None
-        dy, dx = self.spacing[0] / 2, self.spacing[1] / 2
+        dy, dx = (d / 2 for d in self._plane("extent").spacing)
         return float(x[0] - dx), float(x[-1] + dx), float(y[0] - dy), float(y[-1] + dy)
 
     def _along(self, axis: int) -> NDArray[np.float64]:
-        self._need_plane("x, y or extent")
-        assert self.center is not None and self.spacing is not None
-        along = (self.y_axis, self.x_axis)[axis]
+        plane = self._plane("x, y or extent")
+        direction = (plane.y_axis, plane.x_axis)[axis]
         middle = (self.shape[0] // 2, self._middle)[axis]
-        assert along is not None
-        return np.asarray(self.center @ along + (np.arange(self.shape[axis]) - middle) * self.spacing[axis])
+        return np.asarray(plane.center @ direction + (np.arange(self.shape[axis]) - middle) * plane.spacing[axis])
 
     def filled(self) -> ImageGrid:
         """The grid with some position of another cell in every empty cell; itself where no cell is empty."""
@@ -329,29 +329,29 @@ class ImageGrid:
 
     def normal_at(self, row: int, column: int) -> NDArray[np.float64]:
         """Unit normal (3,) at a pixel of a plane, or of a grid that `zero_doppler` made."""
-        at = [validation.number("row", row), validation.number("column", column)]
+        down, right = self._steps_at(row, column)
         if self.is_plane:
             return self.normal
-        i, j = np.clip(at, 0.5, np.array(self.shape) - 1.5)
-        here = self.at([i + 0.5, i - 0.5, i, i], [j, j, j + 0.5, j - 0.5])
-        across = np.cross(here[2] - here[3], here[0] - here[1])
+        across = np.cross(right, down)
         return np.asarray(across / np.linalg.norm(across))
 
     def spacing_at(self, row: int, column: int) -> tuple[float, float]:
         """Distance to the next row and column, m, at a pixel of a plane, or of a grid that `zero_doppler` made."""
-        at = [validation.number("row", row), validation.number("column", column)]
-        if self.spacing is not None:
-            return self.spacing
-        i, j = np.clip(at, 0.5, np.array(self.shape) - 1.5)
-        here = self.at([i + 0.5, i - 0.5, i, i], [j, j, j + 0.5, j - 0.5])
-        return float(np.linalg.norm(here[0] - here[1])), float(np.linalg.norm(here[2] - here[3]))
+        down, right = self._steps_at(row, column)
+        return self.spacing or (float(np.linalg.norm(down)), float(np.linalg.norm(right)))
+
+    def _steps_at(self, row: int, column: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Vectors from row to row and from column to column, m (3,), at a pixel or next to it."""
+        pixel = [validation.number("row", row), validation.number("column", column)]
+        i, j = np.clip(pixel, 0.5, np.array(self.shape) - 1.5)
+        after_row, before_row, after_column, before_column = self.at([i + 0.5, i - 0.5, i, i], [j, j, j + 0.5, j - 0.5])
+        return after_row - before_row, after_column - before_column
 
     @property
     def normal(self) -> NDArray[np.float64]:
         """Unit normal of a plane (3,)."""
-        self._need_plane("normal")
-        assert self.x_axis is not None and self.y_axis is not None
-        return np.cross(self.x_axis, self.y_axis)
+        plane = self._plane("normal")
+        return np.cross(plane.x_axis, plane.y_axis)
 
     @property
     def positions(self) -> NDArray[np.float64]:
@@ -375,41 +375,47 @@ class ImageGrid:
         """Position, m (..., 3), of (fractional) pixel indices of a plane, or of a grid that `zero_doppler` made."""
         if self.times is not None and self.listed is not None:
             return listed_surface.at(self.listed, np.asarray(row), np.asarray(column))
-        self._need_plane("at")
-        assert self.center is not None and self.spacing is not None
-        assert self.y_axis is not None and self.x_axis is not None
-        i = (validation.values("row", row) - self.shape[0] // 2) * self.spacing[0]
-        j = (validation.values("column", column) - self._middle) * self.spacing[1]
+        plane = self._plane("at")
+        i = (validation.values("row", row) - self.shape[0] // 2) * plane.spacing[0]
+        j = (validation.values("column", column) - self._middle) * plane.spacing[1]
         with np.errstate(invalid="ignore"):  # infinite indices have no position: NaN, as of NaN
-            return self.center + i[..., None] * self.y_axis + j[..., None] * self.x_axis
+            return plane.center + i[..., None] * plane.y_axis + j[..., None] * plane.x_axis
 
     def index(self, position: ArrayLike) -> NDArray[np.float64]:
         """Fractional (row, column) (..., 2) of positions, m (..., 3), projected on a plane or a `zero_doppler` grid."""
         if self.times is not None and self.listed is not None:
             return listed_surface.index(self.listed, np.asarray(position))
-        self._need_plane("index")
-        assert (
-            self.center is not None and self.spacing is not None and self.y_axis is not None and self.x_axis is not None
-        )
-        given = validation.values("position", position)
-        if given.ndim == 0 or given.shape[-1] != 3:
-            raise ValueError(f"position has shape {given.shape}, wanted (..., 3)")
-        d = given - self.center
+        plane = self._plane("index")
+        x = validation.values("position", position)
+        if x.ndim == 0 or x.shape[-1] != 3:
+            raise ValueError(f"position has shape {x.shape}, wanted (..., 3)")
+        offset = x - plane.center
         with np.errstate(over="ignore", invalid="ignore"):  # positions that are infinite have no index: NaN
-            row = d @ self.y_axis / self.spacing[0] + self.shape[0] // 2
-            return np.stack([row, d @ self.x_axis / self.spacing[1] + self._middle], axis=-1)
+            row = offset @ plane.y_axis / plane.spacing[0] + self.shape[0] // 2
+            return np.stack([row, offset @ plane.x_axis / plane.spacing[1] + self._middle], axis=-1)
 
-    def _need_plane(self, what: str) -> None:
-        if not self.is_plane:
+    def _plane(self, what: str) -> _Plane:
+        """The axes of a plane; ValueError, which begins with `what`, where the grid lists its points."""
+        if self.center is None or self.spacing is None or self.x_axis is None or self.y_axis is None:
             raise ValueError(f"{what} is for planes; this grid lists its points: use ImageGrid.plane")
+        return _Plane(self.center, self.spacing, self.x_axis, self.y_axis)
 
 
-def _side(name: str, value: Any) -> int:
+class _Plane(NamedTuple):
+    """Fields of an ImageGrid that is a plane."""
+
+    center: NDArray[np.float64]
+    spacing: tuple[float, float]
+    x_axis: NDArray[np.float64]
+    y_axis: NDArray[np.float64]
+
+
+def _side(name: str, value: object) -> int:
     """Number of pixels along a side of a plane; indices are int64 in places and float64 in others."""
-    out = validation.count(name, value)
-    if out > LONGEST:
-        raise ValueError(f"{name} is {out:.3g}; a side has at most {LONGEST:,} pixels: give fewer")
-    return out
+    count = validation.count(name, value)
+    if count > LONGEST:
+        raise ValueError(f"{name} is {count:.3g}; a side has at most {LONGEST:,} pixels: give fewer")
+    return count
 
 
 def _cells(positions: np.ndarray) -> np.ndarray:
@@ -422,19 +428,19 @@ def _cells(positions: np.ndarray) -> np.ndarray:
         raise ValueError("every cell of the grid is empty (NaN, or not valid); give at least one position")
     bad = ~(np.abs(positions) < FARTHEST) & ~empty[..., None]
     if bad.any():
-        at = np.unravel_index(int(np.argmax(bad)), bad.shape)
-        if np.isfinite(positions[at]):
-            where = ", ".join(str(int(i)) for i in at)
-            raise ValueError(f"positions[{where}] is {positions[at]:g} m, where distances overflow; give metres")
+        index = np.unravel_index(int(np.argmax(bad)), bad.shape)
+        shown = ", ".join(str(int(i)) for i in index)
+        if np.isfinite(positions[index]):
+            raise ValueError(f"positions[{shown}] is {positions[index]:g} m, where distances overflow; give metres")
         raise ValueError(
-            f"positions[{', '.join(str(int(i)) for i in at)}] is {positions[at]}; give finite positions, and NaN in "
+            f"positions[{shown}] is {positions[index]}; give finite positions, and NaN in "
             "all three coordinates of a cell that is empty"
         )
     return validation.sealed(positions)
 
 
-def _text(vector: Any) -> str:
-    return "(" + ", ".join(f"{v:g}" for v in vector) + ")"
+def _text(vector: ArrayLike) -> str:
+    return "(" + ", ".join(f"{v:g}" for v in np.asarray(vector)) + ")"
 
 
 def pair(name: str, value: Any) -> tuple[Any, Any]:

@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import os
 from abc import ABC, abstractmethod
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from ..base import arguments
+from ..base.types import LazyRows
 from ..base.validation import sealed
 
 
-def in_memory(source: Any) -> bool:
+def in_memory(source: object) -> TypeGuard[np.ndarray]:
     """Whether `source` is a plain array; a memmap counts as a file."""
     return isinstance(source, np.ndarray) and not isinstance(source, np.memmap)
 
 
-def file_stamps(source: Any) -> dict[str, tuple[int, int, int]]:
+def file_stamps(source: object) -> dict[str, tuple[int, int, int]]:
     """Inode, size and time of change of every file that a source reads its rows from, by its path."""
     if isinstance(source, RowsOnDemand):
         inner = [*getattr(source, "sources", []), *([source.source] if hasattr(source, "source") else [])]
@@ -32,7 +34,7 @@ def file_stamps(source: Any) -> dict[str, tuple[int, int, int]]:
     return {str(path): (state.st_ino, state.st_size, state.st_mtime_ns)}
 
 
-def pick(source: Any, index: np.ndarray) -> Any:
+def pick(source: LazyRows, index: np.ndarray) -> LazyRows:
     """Rows `index` (k,) of a source; lazy where the source is."""
     if in_memory(source):
         return sealed(source[index])
@@ -41,11 +43,12 @@ def pick(source: Any, index: np.ndarray) -> Any:
     return Picked(source, index)
 
 
-def stack(sources: list[Any]) -> Any:
+def stack(sources: list[LazyRows]) -> LazyRows:
     """Rows of several sources, one after another; lazy where any of them is."""
     if len(sources) == 1:
         return sources[0]
-    return sealed(np.concatenate(sources)) if all(map(in_memory, sources)) else Stacked(sources)
+    arrays = [source for source in sources if in_memory(source)]
+    return sealed(np.concatenate(arrays)) if len(arrays) == len(sources) else Stacked(sources)
 
 
 class RowsOnDemand(ABC):
@@ -55,47 +58,47 @@ class RowsOnDemand(ABC):
     dtype: np.dtype[Any]
 
     @abstractmethod
-    def rows(self, some: slice) -> np.ndarray:
+    def rows(self, rows: slice) -> np.ndarray:
         """The rows of a slice of step 1, whose ends lie within the rows."""
 
     def __getitem__(self, index: Any) -> np.ndarray:
-        """What NumPy gives for this index of all rows; slices of rows alone, and single rows, read no others."""
+        """Values as NumPy indexes all rows; slices of rows alone, and single rows, read no others."""
         rows, *others = index if isinstance(index, tuple) else (index,)
         if others or isinstance(rows, slice):
             arguments.checked_index("index", "samples", index, self.shape)
         if isinstance(rows, slice):
-            taken = range(*rows.indices(self.shape[0]))
-            if len(taken) == 0:
-                made = np.empty((0, *self.shape[1:]), self.dtype)
+            steps = range(*rows.indices(self.shape[0]))
+            if len(steps) == 0:
+                block = np.empty((0, *self.shape[1:]), self.dtype)
             else:
-                low, high = min(taken[0], taken[-1]), max(taken[0], taken[-1])
-                made = self.rows(slice(low, high + 1))[:: taken.step]
-            return made[(slice(None), *others)] if others else made
+                low, high = min(steps[0], steps[-1]), max(steps[0], steps[-1])
+                block = self.rows(slice(low, high + 1))[:: steps.step]
+            return block[(slice(None), *others)] if others else block
         if isinstance(rows, (int, np.integer)) and not isinstance(rows, (bool, np.bool_)):
-            at = int(rows) + (self.shape[0] if rows < 0 else 0)
-            if not 0 <= at < self.shape[0]:
+            row = int(rows) + (self.shape[0] if rows < 0 else 0)
+            if not 0 <= row < self.shape[0]:
                 raise IndexError(
                     f"row {rows} was requested, but there are {self.shape[0]}; give one from {-self.shape[0]} to "
                     f"{self.shape[0] - 1}"
                 )
-            return np.asarray(self.rows(slice(at, at + 1))[(0, *others)])
+            return np.asarray(self.rows(slice(row, row + 1))[(0, *others)])
         arguments.checked_index("index", "samples", index, self.shape)
         return np.asarray(self.rows(slice(0, self.shape[0]))[index])
 
-    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> np.ndarray:
         return np.asarray(self[:], dtype)
 
 
 class Picked(RowsOnDemand):
     """Selected rows of a lazy source; a slice reads its rows, one read per run of consecutive rows."""
 
-    def __init__(self, source: Any, index: np.ndarray) -> None:
+    def __init__(self, source: LazyRows, index: np.ndarray) -> None:
         self.source, self.index = source, index
         self.shape = (len(index), *source.shape[1:])
         self.dtype = source.dtype
 
-    def rows(self, some: slice) -> np.ndarray:
-        index = self.index[some]
+    def rows(self, rows: slice) -> np.ndarray:
+        index = self.index[rows]
         runs = np.split(index, np.flatnonzero(np.diff(index) != 1) + 1)
         return np.concatenate([np.asarray(self.source[int(r[0]) : int(r[-1]) + 1]) for r in runs])
 
@@ -103,14 +106,14 @@ class Picked(RowsOnDemand):
 class Stacked(RowsOnDemand):
     """Rows of several sources one after another; a slice reads only the sources of its rows."""
 
-    def __init__(self, sources: list[Any]) -> None:
+    def __init__(self, sources: list[LazyRows]) -> None:
         self.sources = sources
         self.first = np.cumsum([0, *(s.shape[0] for s in sources)])
         self.shape = (int(self.first[-1]), *sources[0].shape[1:])
         self.dtype = np.result_type(*(s.dtype for s in sources))
 
-    def rows(self, some: slice) -> np.ndarray:
-        start, stop, _ = some.indices(self.shape[0])
+    def rows(self, rows: slice) -> np.ndarray:
+        start, stop, _ = rows.indices(self.shape[0])
         out = np.empty((stop - start, *self.shape[1:]), self.dtype)
         for first, source in zip(self.first.tolist(), self.sources, strict=False):
             a, b = max(start, first), min(stop, first + source.shape[0])
@@ -122,32 +125,32 @@ class Stacked(RowsOnDemand):
 class Scaled(RowsOnDemand):
     """Rows of a source times a factor per row (n,); a slice reads and multiplies its rows."""
 
-    def __init__(self, source: Any, factor: np.ndarray) -> None:
+    def __init__(self, source: LazyRows, factor: np.ndarray) -> None:
         self.source, self.factor = source, factor.astype(np.result_type(source.dtype, np.complex64))
         self.shape, self.dtype = source.shape, self.factor.dtype
 
-    def rows(self, some: slice) -> np.ndarray:
-        return np.asarray(self.source[some]) * self.factor[some, None]
+    def rows(self, rows: slice) -> np.ndarray:
+        return np.asarray(self.source[rows]) * self.factor[rows, None]
 
 
 class Tapered(RowsOnDemand):
     """Rows of a source, each times the same factors (n_columns,); a slice reads and multiplies its rows."""
 
-    def __init__(self, source: Any, factors: np.ndarray) -> None:
+    def __init__(self, source: LazyRows, factors: np.ndarray) -> None:
         self.source, self.factors = source, factors.astype(np.float32)
         self.shape, self.dtype = source.shape, source.dtype
 
-    def rows(self, some: slice) -> np.ndarray:
-        return np.asarray(self.source[some]) * self.factors
+    def rows(self, rows: slice) -> np.ndarray:
+        return np.asarray(self.source[rows]) * self.factors
 
 
 class Columns(RowsOnDemand):
     """Columns first ... last - 1 of a source; a slice reads its rows."""
 
-    def __init__(self, source: Any, first: int, last: int) -> None:
+    def __init__(self, source: LazyRows, first: int, last: int) -> None:
         self.source, self.columns = source, slice(first, last)
         self.shape = (source.shape[0], last - first)
         self.dtype = source.dtype
 
-    def rows(self, some: slice) -> np.ndarray:
-        return np.asarray(self.source[some])[:, self.columns]
+    def rows(self, rows: slice) -> np.ndarray:
+        return np.asarray(self.source[rows])[:, self.columns]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-STEPS = 30  # of Gauss and Newton, at most: a smooth grid needs five
-NEAR = 1e-9  # pixels: a smaller step ends the search
+STEPS = 30  # most iterations of Gauss and Newton: a smooth grid needs five
+NEAR = 1e-9  # pixels, of a step: a smaller one ends the search
 
 
 def at(listed: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndarray:
@@ -39,10 +39,10 @@ def index(listed: np.ndarray, position: np.ndarray) -> np.ndarray:
     last = np.array(listed.shape[:2]) - 1
     if (last < 1).any():
         raise ValueError(f"a grid of {listed.shape[:2]} has no surface; it needs two rows and two columns at least")
-    found = np.broadcast_to(last / 2, (len(x), 2)).copy()
+    indices = np.broadcast_to(last / 2, (len(x), 2)).copy()
     for _ in range(STEPS):
-        inside = np.clip(found, 0, last)
-        here = at(listed, inside[:, 0], inside[:, 1])
+        inside = np.clip(indices, 0, last)
+        points = at(listed, inside[:, 0], inside[:, 1])
         ahead = np.minimum(inside + 0.5, last)
         behind = ahead - 0.5
         slopes = np.stack(
@@ -52,9 +52,9 @@ def index(listed: np.ndarray, position: np.ndarray) -> np.ndarray:
             ],
             axis=-1,
         )  # (n, 3, 2)
-        moved = inside + np.einsum("nij,nj->ni", np.linalg.pinv(slopes), x - here)
-        step = float(np.abs(moved - found).max(initial=0.0))
-        found = moved
+        new_indices = inside + np.einsum("nij,nj->ni", np.linalg.pinv(slopes), x - points)
+        step = float(np.abs(new_indices - indices).max(initial=0.0))
+        indices = new_indices
         if step < NEAR:
             break
-    return found.reshape(*np.shape(position)[:-1], 2)
+    return indices.reshape(*np.shape(position)[:-1], 2)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,7 +25,7 @@ from .trajectory import BYTES_PER_PULSE, Trajectory
 if TYPE_CHECKING:
     from ..base.types import PathLike
 
-LINES_DAYS = 1.0  # about the epoch of two-line elements; their error grows by kilometres per day
+LINES_DAYS = 1.0  # days before and after the epoch of two-line elements, whose error grows by kilometres per day
 ROUNDING = 1e-9  # s: a time outside the span by less counts as its end
 DIFFERENCE = 0.5  # s: of velocities to accelerations, accurate to 1e-6 m/s^2
 
@@ -98,10 +98,16 @@ class Orbit:
         ValueError for an eccentricity outside [0, 1), and a perigee below the Earth's surface.
         """
         zero = None if epoch is None else date(epoch)
-        path = KeplerElements.checked(
-            semi_major_axis, eccentricity, inclination, node, argument_of_perigee, mean_anomaly,
-            greenwich=0.0 if zero is None else rotation.sidereal_time(zero), j2=j2,
-        )  # fmt: skip
+        path = KeplerElements(
+            semi_major_axis=semi_major_axis,
+            eccentricity=eccentricity,
+            inclination=inclination,
+            node=node,
+            perigee=argument_of_perigee,
+            anomaly=mean_anomaly,
+            greenwich=0.0 if zero is None else rotation.sidereal_time(zero),
+            with_j2=j2,
+        )
         half = np.pi / path.mean_motion
         return cls(path, (-half, half) if span is None else span_of(span), zero)
 
@@ -132,7 +138,7 @@ class Orbit:
             raise ValueError(f"orbit file {path.name!r}: {exc}") from None
 
     def describe(self) -> str:
-        """How positions are computed, with the order of the interpolation and its measured error, and from when on."""
+        """Words for the computation of positions: order and measured error of the interpolation, span of time."""
         start, stop = self.span
         since = "an unknown epoch" if self.epoch is None else f"{self.epoch} UTC"
         return f"{self.path.describe()}; from {start:.9g} to {stop:.9g} s after {since}"
@@ -188,10 +194,10 @@ class Orbit:
         if (n_pulses is None) == (duration is None):
             raise ValueError("the length of the track is n_pulses or duration (s); give one of them")
         if duration is not None:
-            wanted = validation.number("duration", duration, above=0) * prf
-            what = f"a track of duration {duration:g} s with {wanted:.3g} pulses"
-            validation.room(what, BYTES_PER_PULSE * wanted, "give a shorter duration or a lower prf")
-            n_pulses = max(1, round(wanted))
+            n_intervals = validation.number("duration", duration, above=0) * prf
+            what = f"a track of duration {duration:g} s with {n_intervals:.3g} pulses"
+            validation.room(what, BYTES_PER_PULSE * n_intervals, "give a shorter duration or a lower prf")
+            n_pulses = max(1, round(n_intervals))
         n_pulses = validation.count("n_pulses", n_pulses)
         validation.room(f"a track of {n_pulses:.3g} pulses", BYTES_PER_PULSE * float(n_pulses), "give fewer pulses")
         if (start is None) == (center is None):
@@ -254,11 +260,11 @@ class Orbit:
         validation.finite("heights", levels)
         times, ranges, levels = together(t=times, r=ranges, heights=levels)
         p, v = self._at(times.ravel())
-        found = zero_doppler.geolocate(p, v, ranges.ravel(), levels.ravel() if model is None else model, sign)
-        return found.reshape(*times.shape, 3)
+        x = zero_doppler.geolocate(p, v, ranges.ravel(), levels.ravel() if model is None else model, sign)
+        return x.reshape(*times.shape, 3)
 
     def view(self, t: ArrayLike, positions: ArrayLike) -> viewing.View:
-        """How the satellite at times, s (...), sees Earth-fixed positions, m (..., 3): angles, ranges, Doppler."""
+        """View of Earth-fixed positions, m (..., 3), from the satellite at times, s (...): angles, ranges, Doppler."""
         x = places(positions)
         times, _ = together(t=self._times(t), positions=x[..., 0])
         p, v = self._states(times)
@@ -313,7 +319,7 @@ class Orbit:
         body = ellipse(float(widths[0]), float(widths[1]), n)
         return zero_doppler.ray_ends(np.broadcast_to(p, (n, 3)), body @ axes.T, validation.number("height", height))
 
-    def _time(self, name: str, value: Any) -> float:
+    def _time(self, name: str, value: object) -> float:
         """A time, s since the epoch: a number, or a date."""
         if isinstance(value, (str, datetime.date, np.datetime64)):
             return float(self.seconds(value))
@@ -326,10 +332,10 @@ class Orbit:
         start, stop = self.span
         outside = (times < start - ROUNDING) | (times > stop + ROUNDING)
         if outside.any():
-            at = np.unravel_index(int(np.argmax(outside)), times.shape)
-            where = f"[{', '.join(str(int(i)) for i in at)}]" if at else ""
+            index = np.unravel_index(int(np.argmax(outside)), times.shape)
+            shown = f"[{', '.join(str(int(i)) for i in index)}]" if index else ""
             raise ValueError(
-                f"t{where} = {times[at]:.9g} s is outside the orbit, which reaches from {start:.9g} to {stop:.9g} s "
+                f"t{shown} = {times[index]:.9g} s is outside the orbit, which reaches from {start:.9g} to {stop:.9g} s "
                 f"after {'its epoch' if self.epoch is None else self.epoch}; give times within it"
             )
         return np.asarray(np.clip(times, start, stop))

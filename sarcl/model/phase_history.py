@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from ..base import arguments, constants, validation
 from ..base.report import Report
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from .waveform import Waveform
 
 # optional arrays with one entry per row: name -> (dtype, trailing shape)
-PER_ROW = {
+PER_ROW: dict[str, tuple[DTypeLike, tuple[int, ...]]] = {
     "time": (np.float64, ()),
     "tx_channel": (np.int64, ()),
     "rx_channel": (np.int64, ()),
@@ -175,37 +175,44 @@ class PhaseHistory:
         """
         n_rows, n_samples = self.samples.shape
         validation.ndim("frequency", self.frequency)
-        given = np.asarray(self.frequency)
-        if given.shape != (n_samples,) or n_samples < 2 or self.tx_channel is not None or self.rx_channel is not None:
+        frequency = np.asarray(self.frequency)
+        if (
+            frequency.shape != (n_samples,)
+            or n_samples < 2
+            or self.tx_channel is not None
+            or self.rx_channel is not None
+        ):
             return
-        axis = n_rows != n_samples
-        if not axis and np.ndim(self.frequency_step) == 0 and given.dtype.kind in "iuf":
-            step, wanted = np.diff(given.astype(np.float64)), float(np.asarray(self.frequency_step))
-            axis = bool((np.abs(step - wanted) <= 0.02 * abs(wanted)).all())
-        if axis:
+        is_axis = n_rows != n_samples
+        if not is_axis and np.ndim(self.frequency_step) == 0 and frequency.dtype.kind in "iuf":
+            steps, frequency_step = np.diff(frequency.astype(np.float64)), float(np.asarray(self.frequency_step))
+            is_axis = bool((np.abs(steps - frequency_step) <= 0.02 * abs(frequency_step)).all())
+        if is_axis:
             raise ValueError(
                 f"frequency has {n_samples} values, one per sample: it is the axis of the samples, where the frequency "
                 "of sample 0 is wanted, one number or one per row; give frequency=f[0], frequency_step=f[1] - f[0]. "
                 "(Rows that do start frequency_step apart: give them tx_channel=, such as numpy.arange(n_rows))"
             )
 
-    def _set(self, name: str, value: Any) -> None:
+    def _set(self, name: str, value: object) -> None:
         object.__setattr__(self, name, value)
 
-    def _rows(self, name: str, value: Any, dtype: Any, tail: tuple[int, ...], spread: bool = False) -> np.ndarray:
+    def _rows(
+        self, name: str, value: object, dtype: DTypeLike, tail: tuple[int, ...], spread: bool = False
+    ) -> np.ndarray:
         """`value` with one entry per row; with `spread`, a single number is taken for all rows."""
         n = self.samples.shape[0]
         if validation.ndim(name, value) == 0 and spread:
             validation.without_unit(name, value)
             value = np.full(n, validation.unmasked(name, value))
-        out = _words(name, value) if dtype == "U2" else validation.converted(name, value, dtype)
-        if out.ndim != 1 + len(tail) or out.shape[1:] != tail:
-            raise ValueError(f"{name} has shape {out.shape}, wanted {(n, *tail)}")
-        if len(out) != n:
-            raise ValueError(f"samples has {n} rows but {name} has {len(out)}; give one {name} per row")
-        if out.dtype.kind in "fc":
-            validation.finite(name, out)
-        return validation.sealed(out)
+        rows = _words(name, value) if dtype == "U2" else validation.converted(name, value, dtype)
+        if rows.ndim != 1 + len(tail) or rows.shape[1:] != tail:
+            raise ValueError(f"{name} has shape {rows.shape}, wanted {(n, *tail)}")
+        if len(rows) != n:
+            raise ValueError(f"samples has {n} rows but {name} has {len(rows)}; give one {name} per row")
+        if rows.dtype.kind in "fc":
+            validation.finite(name, rows)
+        return validation.sealed(rows)
 
     @classmethod
     def from_time(
@@ -272,21 +279,30 @@ class PhaseHistory:
                 f"{'tx and track are both None' if tx is None else 'tx and track are both given'}; give exactly one: "
                 "positions, m (n_rows, 3), or a Trajectory"
             )
-        made, pulse = _time_samples.spectra_of(
-            samples, kind, rate, start, carrier, bandwidth, waveform, pulse_time, sweep_rate, beat, reference_range,
-            scene_range,
-        )  # fmt: skip
+        spectra = _time_samples.spectra_of(
+            _time_samples.TimeRecord(
+                samples=samples,
+                kind=kind,
+                rate=rate,
+                start=start,
+                carrier=carrier,
+                bandwidth=bandwidth,
+                waveform=waveform,
+                pulse_time=pulse_time,
+                sweep_rate=sweep_rate,
+                beat=beat,
+                reference_range=reference_range,
+                scene_range=scene_range,
+            )
+        )
         places: dict[str, Any] = {"tx": tx, "rx": rx, **rows}
         if track is not None:
-            places = rows_of_track(track, rx, made.reference_range, rows)
+            places = rows_of_track(track, rx, spectra.reference_range, rows)
         compressed = kind != "chirped" and not (kind == "rf" and waveform is not None)
-        out = cls(
-            made.samples, made.frequency, made.step, reference_range=made.reference_range, waveform=pulse,
-            compressed=compressed, **places,
-        )  # fmt: skip
+        raw = cls(**spectra._asdict(), waveform=waveform, compressed=compressed, **places)
         if track is None:
-            check_orbit(out)
-        return out
+            check_orbit(raw)
+        return raw
 
     def __repr__(self) -> str:
         low = self.frequency.min() / 1e9
@@ -358,22 +374,24 @@ class PhaseHistory:
         self, *, polarization: str | None = None, channel: int | None = None, sender: int | None = None
     ) -> PhaseHistory:
         """Rows of one polarisation ("HV"), receive channel, transmitting element. ValueError lists those that exist."""
-        keep, where = np.ones(self.n_rows, bool), "these data"
-        for name, there, wanted in (
+        is_selected, described = np.ones(self.n_rows, bool), "these data"
+        for name, values, value in (
             ("polarization", self.polarization, polarization),
             ("channel", self.rx_channel, channel),
             ("sender", self.tx_channel, sender),
         ):
-            if wanted is None:
+            if value is None:
                 continue
-            if there is None:
+            if values is None:
                 raise ValueError(f"these data name no {name}; it is the same for every row")
-            known = isinstance(wanted, str) if name == "polarization" else isinstance(wanted, (int, np.integer))
-            if not known or not (keep & (there == wanted)).any():
-                raise ValueError(f"{name} {wanted!r} is not in {where}; there are {sorted(set(there[keep].tolist()))}")
-            keep &= there == wanted
-            where = f"the rows of {name} {wanted!r}"
-        return self[keep]
+            is_valid = isinstance(value, str) if name == "polarization" else isinstance(value, (int, np.integer))
+            if not is_valid or not (is_selected & (values == value)).any():
+                raise ValueError(
+                    f"{name} {value!r} is not in {described}; there are {sorted(set(values[is_selected].tolist()))}"
+                )
+            is_selected &= values == value
+            described = f"the rows of {name} {value!r}"
+        return self[is_selected]
 
     def time_signal(self, oversample: int = 1) -> tuple[np.ndarray, np.ndarray]:
         """Baseband signals in time: (delay about tau_ref, s (n,) or (n_rows, n); complex (n_rows, n)).
@@ -423,11 +441,11 @@ def phase_history_fields(raw: PhaseHistory) -> dict[str, Any]:
     }
 
 
-def _words(name: str, value: Any) -> np.ndarray:
+def _words(name: str, value: object) -> np.ndarray:
     """Strings (n,), from strings or from bytes, as files hold them."""
-    given = np.asarray(value)
-    if given.dtype.kind == "S":
-        given = np.char.decode(given, "ascii")
-    if not all(isinstance(word, str) for word in given.ravel().tolist()):
+    words = np.asarray(value)
+    if words.dtype.kind == "S":
+        words = np.char.decode(words, "ascii")
+    if not all(isinstance(word, str) for word in words.ravel().tolist()):
         raise ValueError(f"{name} must be strings such as 'HH', got {value!r:.80}")
-    return given.astype(str)
+    return words.astype(str)

@@ -125,15 +125,15 @@ def velocities(track: Trajectory) -> np.ndarray:
 
 def rotations(name: str, value: ArrayLike, lead: tuple[int, ...]) -> np.ndarray:
     """`value` as rotation matrices lead + (3, 3); ValueError where one is not, to 1e-6."""
-    out = validation.array(name, value, np.float64, (*lead, 3, 3))
-    off = np.abs(np.swapaxes(out, -1, -2) @ out - np.eye(3)).max(axis=(-1, -2))
-    bad = np.atleast_1d((off > 1e-6) | (np.linalg.det(out) < 0))
+    matrices = validation.array(name, value, np.float64, (*lead, 3, 3))
+    error = np.abs(np.swapaxes(matrices, -1, -2) @ matrices - np.eye(3)).max(axis=(-1, -2))
+    bad = np.atleast_1d((error > 1e-6) | (np.linalg.det(matrices) < 0))
     if bad.any():
-        at = f"[{int(np.argmax(bad))}]" if lead else ""
+        place = f"[{int(np.argmax(bad))}]" if lead else ""
         raise ValueError(
-            f"{name}{at} is no rotation; its columns must be three unit vectors at right angles, right-handed"
+            f"{name}{place} is no rotation; its columns must be three unit vectors at right angles, right-handed"
         )
-    return out
+    return matrices
 
 
 def _vertical(track: Trajectory, up: ArrayLike | None) -> np.ndarray:
@@ -154,22 +154,22 @@ def _looking(track: Trajectory, look: np.ndarray, up: np.ndarray) -> Trajectory:
     side = np.cross(up, look)
     length = np.linalg.norm(side, axis=1, keepdims=True)
     other = np.where(np.abs(look[:, 1:2]) < 0.9, [[0.0, 1.0, 0.0]], [[1.0, 0.0, 0.0]])
-    instead = np.cross(other, look)
+    level = np.cross(other, look)
     side = np.where(
-        length < 1e-6, instead / np.linalg.norm(instead, axis=1, keepdims=True), side / np.maximum(length, 1e-6)
+        length < 1e-6, level / np.linalg.norm(level, axis=1, keepdims=True), side / np.maximum(length, 1e-6)
     )
     return replace(track, attitude=np.stack([look, side, np.cross(look, side)], axis=-1))
 
 
 def _vectors(name: str, value: ArrayLike, n: int) -> np.ndarray:
     """`value` (3,) or (n, 3) as (n, 3)."""
-    out = validation.array(name, value, np.float64, (3,) if validation.ndim(name, value) == 1 else (n, 3))
-    return np.broadcast_to(out, (n, 3))
+    vectors = validation.array(name, value, np.float64, (3,) if validation.ndim(name, value) == 1 else (n, 3))
+    return np.broadcast_to(vectors, (n, 3))
 
 
 def _units(name: str, value: ArrayLike, n: int) -> np.ndarray:
-    out = _vectors(name, value, n)
-    length = np.linalg.norm(out, axis=1, keepdims=True)
+    vectors = _vectors(name, value, n)
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
     if not length.all():
         raise ValueError(f"{name} is (0, 0, 0) at pulse {int(np.argmin(length))}; a direction needs a length")
-    return out / length
+    return vectors / length

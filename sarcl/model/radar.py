@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,8 +11,8 @@ from ..base import constants, validation
 from .phase_history import PhaseHistory
 from .waveform import Waveform
 
-MOST_DECIBELS = 300.0  # of losses: amplitudes stay within float32
-BOLTZMANN = 1.380649e-23  # J/K, exact
+MOST_DECIBELS = 300.0  # largest losses, dB: amplitudes stay within float32
+BOLTZMANN = 1.380649e-23  # Boltzmann's constant, J/K, exact
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,10 +43,10 @@ class Radar:
 
     def factor(self, frequency: ArrayLike) -> NDArray[np.float64]:
         """sqrt(P lambda^2/((4 pi)^3 L)), sqrt(W) m, at `frequency` Hz (...): all that does not depend on position."""
-        given = validation.values("frequency", frequency)
-        if not (given > 0).all():
-            raise ValueError(f"frequency is {given.min():g} Hz; it must be positive")
-        wave = constants.SPEED_OF_LIGHT / given
+        f = validation.values("frequency", frequency)
+        if not (f > 0).all():
+            raise ValueError(f"frequency is {f.min():g} Hz; it must be positive")
+        wave = constants.SPEED_OF_LIGHT / f
         loss = 10 ** (self.losses_db / 10)
         return np.asarray(np.sqrt(self.power / ((4 * np.pi) ** 3 * loss)) * wave)
 
@@ -58,14 +57,14 @@ class Radar:
         rx_range: ArrayLike,
         tx_gain: ArrayLike = 1.0,
         rx_gain: ArrayLike = 1.0,
-    ) -> Any:
+    ) -> NDArray[np.inexact]:
         """sqrt(W) received from a cross section of 1 m^2: factor x spreading x amplitude gains.
 
         Its square is P G_t G_r lambda^2/((4 pi)^3 R_t^2 R_r^2 L). Ranges m; gains are amplitudes, sqrt(G), and may be
         complex (`Antenna.gain`). Source: Skolnik, Radar Handbook, 3rd ed., ch. 1, for two antennas.
         """
-        given = (("tx_gain", tx_gain), ("rx_gain", rx_gain))
-        gains = [validation.values(name, gain, np.complex128) for name, gain in given]
+        named_gains = (("tx_gain", tx_gain), ("rx_gain", rx_gain))
+        gains = [validation.values(name, gain, np.complex128) for name, gain in named_gains]
         out = self.factor(frequency) * spreading(tx_range, rx_range) * gains[0] * gains[1]
         return out if np.iscomplexobj(tx_gain) or np.iscomplexobj(rx_gain) else out.real
 
@@ -73,15 +72,15 @@ class Radar:
 def spreading(tx_range: ArrayLike, rx_range: ArrayLike) -> NDArray[np.float64]:
     """1/(R_t R_r), 1/m^2. ValueError where a range is 0 or less: an antenna stands on a scatterer."""
     ranges = []
-    for name, given in (("tx_range", tx_range), ("rx_range", rx_range)):
-        made = validation.values(name, given)
-        if not (made > 0).all():
-            least = made[~(made > 0)].ravel()[0]
+    for name, value in (("tx_range", tx_range), ("rx_range", rx_range)):
+        r = validation.values(name, value)
+        if not (r > 0).all():
+            least = r[~(r > 0)].ravel()[0]
             raise ValueError(
                 f"{name} is {least:g} m: an antenna stands on a scatterer, where the radar equation is not defined; "
                 "move it, or give ranges above 0"
             )
-        ranges.append(made)
+        ranges.append(r)
     return 1 / (ranges[0] * ranges[1])
 
 

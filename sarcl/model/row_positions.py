@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..base import validation
 from ..base.constants import SPEED_OF_LIGHT
@@ -34,20 +35,22 @@ def at_arrival(track: Trajectory, pulses: np.ndarray, reference_range: np.ndarra
     return {"tx": tx, "rx": rx, "tx_velocity": tx_velocity, "rx_velocity": rx_velocity}
 
 
-def rows_of_track(track: Trajectory, rx: Any, reference_range: np.ndarray, rows: Mapping[str, Any]) -> dict[str, Any]:
+def rows_of_track(
+    track: Trajectory, rx: ArrayLike | None, reference_range: np.ndarray, rows: Mapping[str, Any]
+) -> dict[str, Any]:
     """Fields of a phase history whose rows are the pulses of a track. ValueError for another number of them."""
     validation.instance("track", track, Trajectory)
-    twice = [name for name in GIVEN if rows.get(name) is not None] + ["rx"] * (rx is not None)
-    if twice:
-        raise ValueError(f"{twice[0]} is given, and so is track, which has its own; leave one out, or give tx=")
+    duplicates = [name for name in GIVEN if rows.get(name) is not None] + ["rx"] * (rx is not None)
+    if duplicates:
+        raise ValueError(f"{duplicates[0]} is given, and so is track, which has its own; leave one out, or give tx=")
     if len(track) != len(reference_range):
         raise ValueError(
             f"samples has {len(reference_range)} rows but track {len(track)} pulses; give a track with a pulse per row"
         )
-    made: dict[str, Any] = {**rows, "time": track.times}
+    fields: dict[str, Any] = {**rows, "time": track.times}
     if not track.stop_and_go:
-        return {**made, **at_arrival(track, np.arange(len(track)), reference_range)}
-    return {**made, "tx": track.positions, "tx_velocity": track.velocities, "rx_velocity": track.velocities}
+        return {**fields, **at_arrival(track, np.arange(len(track)), reference_range)}
+    return {**fields, "tx": track.positions, "tx_velocity": track.velocities, "rx_velocity": track.velocities}
 
 
 def check_orbit(raw: PhaseHistory) -> None:
@@ -55,15 +58,15 @@ def check_orbit(raw: PhaseHistory) -> None:
     if raw.time is None or raw.n_rows < 2 or not raw.is_monostatic:
         return
     first, last = int(np.argmin(raw.time)), int(np.argmax(raw.time))
-    passed = float(raw.time[last] - raw.time[first])
-    if passed <= 0 or np.linalg.norm(raw.tx, axis=1).min() < FARTHEST:
+    elapsed = float(raw.time[last] - raw.time[first])
+    if elapsed <= 0 or np.linalg.norm(raw.tx, axis=1).min() < FARTHEST:
         return
-    speed = float(np.linalg.norm(raw.tx[last] - raw.tx[first])) / passed
+    speed = float(np.linalg.norm(raw.tx[last] - raw.tx[first])) / elapsed
     if speed > FASTEST:
-        moved = speed * float(np.median(raw.reference_range)) / SPEED_OF_LIGHT
+        shift = speed * float(np.median(raw.reference_range)) / SPEED_OF_LIGHT
         warn(
             f"tx moves at {speed / 1e3:.3g} km/s, {np.linalg.norm(raw.tx[first]) / 1e3:.5g} km from the origin, as a "
             "satellite does, and rx is the same: without the way that it goes while an echo is under way the image "
-            f"lies {moved:.3g} m off along the track. Give track=orbit.trajectory(...) in place of tx, which takes "
+            f"lies {shift:.3g} m off along the track. Give track=orbit.trajectory(...) in place of tx, which takes "
             "that and the rotation of the Earth into account"
         )

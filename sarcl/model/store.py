@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -38,15 +38,13 @@ def finish_image(writer: sarcl_hdf5.ImageWriter, grid: ImageGrid, **fields: Any)
         writer.abandon()
         raise
     writer.close(image_fields(image))
-    made: Any = read(writer.path)
-    return made
+    return cast(Image, read(writer.path))
 
 
 def finish_phase_history(writer: sarcl_hdf5.EchoWriter, **fields: Any) -> PhaseHistory:
     """Complete a file of echoes with the other fields of a PhaseHistory, and return it; samples stay in the file."""
     writer.close(phase_history_fields(PhaseHistory(writer.samples, **fields)))
-    made: Any = read(writer.path)
-    return made
+    return cast(PhaseHistory, read(writer.path))
 
 
 def read(
@@ -75,8 +73,7 @@ def read(
         return parts[0] if len(parts) == 1 else concatenate(parts)  # type: ignore[arg-type]
     if not isinstance(path, (str, os.PathLike)):
         raise TypeError(f"path is a {type(path).__name__}; give a file name or a list of file names")
-    made: PhaseHistory | Image = formats.load(arguments.path("path", path), _make, autofocus, external)
-    return made
+    return formats.load(arguments.path("path", path), _make, autofocus, external)
 
 
 def _make(kind: formats.Kind, fields: Mapping[str, Any]) -> PhaseHistory | Image:
@@ -92,7 +89,7 @@ def _phase_history(stored: Mapping[str, Any]) -> PhaseHistory:
     return PhaseHistory(**fields, compressed=bool(stored["compressed"]))
 
 
-def _fields(kind: Any, stored: Mapping[str, Any]) -> dict[str, Any]:
+def _fields(kind: type[Waveform | AntennaArray | ImageGrid], stored: Mapping[str, Any]) -> dict[str, Any]:
     """The fields of a dataclass by name; None for those that the file does not have."""
     return {name: stored.get(name) for name in kind.__dataclass_fields__}
 

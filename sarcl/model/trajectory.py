@@ -57,22 +57,17 @@ class Trajectory:
         else:
             times = validation.array("trajectory times", self.times, np.float64, (n,))
             if n > 1 and not (np.diff(times) > 0).all():
-                at = int(np.argmax(np.diff(times) <= 0)) + 1
+                pulse = int(np.argmax(np.diff(times) <= 0)) + 1
                 raise ValueError(
-                    f"trajectory times[{at}] is {times[at]:g} after {times[at - 1]:g}; times must increase: "
+                    f"trajectory times[{pulse}] is {times[pulse]:g} after {times[pulse - 1]:g}; times must increase: "
                     "give every pulse a later time than the one before"
                 )
             object.__setattr__(self, "times", times)
         object.__setattr__(self, "positions", positions)
-        if self.velocities is not None:
-            v = validation.array("trajectory velocities", self.velocities, np.float64, (n, 3))
-            object.__setattr__(self, "velocities", v)
-        if self.attitude is not None:
-            a = validation.array("trajectory attitude", self.attitude, np.float64, (n, 3, 3))
-            object.__setattr__(self, "attitude", a)
-        if self.accelerations is not None:
-            a = validation.array("trajectory accelerations", self.accelerations, np.float64, (n, 3))
-            object.__setattr__(self, "accelerations", a)
+        for name, shape in (("velocities", (n, 3)), ("attitude", (n, 3, 3)), ("accelerations", (n, 3))):
+            if getattr(self, name) is not None:
+                value = validation.array(f"trajectory {name}", getattr(self, name), np.float64, shape)
+                object.__setattr__(self, name, value)
         object.__setattr__(self, "stop_and_go", validation.flag("stop_and_go", self.stop_and_go))
         if not self.stop_and_go and (self.velocities is None or self.accelerations is None):
             raise ValueError(
@@ -86,10 +81,10 @@ class Trajectory:
     def __repr__(self) -> str:
         first, last = ("(" + ", ".join(f"{x:.6g}" for x in self.positions[i]) + ")" for i in (0, -1))
         times = "without times" if self.times is None else f"over {np.ptp(self.times):.6g} s"
-        more = ("velocities", "attitude", "accelerations")
-        known = "".join(f", {name}" for name in more if getattr(self, name) is not None)
-        moving = "" if self.stop_and_go else ", not stop-and-go"
-        return f"Trajectory({len(self)} pulses {times}, from {first} to {last} m{known}{moving})"
+        optional = ("velocities", "attitude", "accelerations")
+        fields_text = "".join(f", {name}" for name in optional if getattr(self, name) is not None)
+        motion = "" if self.stop_and_go else ", not stop-and-go"
+        return f"Trajectory({len(self)} pulses {times}, from {first} to {last} m{fields_text}{motion})"
 
     @property
     def known_times(self) -> NDArray[np.float64]:
@@ -103,9 +98,9 @@ class Trajectory:
     def picked(self, pulses: slice | np.ndarray) -> Trajectory:
         """The track at the pulses of a slice, or at increasing pulse numbers."""
         arguments.checked_index("pulses", "a track", pulses, (len(self.positions),))
-        whole = {name: getattr(self, name) for name in self.__dataclass_fields__}
-        some: dict[str, Any] = {n: value[pulses] for n, value in whole.items() if isinstance(value, np.ndarray)}
-        return replace(self, **some)
+        fields = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        arrays: dict[str, Any] = {n: value[pulses] for n, value in fields.items() if isinstance(value, np.ndarray)}
+        return replace(self, **arrays)
 
     @classmethod
     def line(cls, *, start: ArrayLike, velocity: ArrayLike, prf: float, n_pulses: int) -> Trajectory:

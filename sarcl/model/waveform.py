@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..base import validation
 
-NEAR_PEAK = 0.98  # of the largest sample of a spectrum: lower ones lie by no higher peak
-MOST_PEAKS, ORDERS = 16, 13  # peaks that are looked at; terms of their series: the next is below 1e-15
+NEAR_PEAK = 0.98  # ratio to the largest sample of a spectrum: lower samples lie by no higher peak
+MOST_PEAKS = 16  # peaks of a spectrum that are examined
+ORDERS = 13  # terms of the power series about a peak: the next is below 1e-15
 Kind = Literal["chirp", "down-chirp", "tone", "sampled"]
 
 
@@ -107,10 +108,10 @@ class Waveform:
         """
         f = validation.values("frequency", frequency) - self.center
         if self.sweep_rate is not None:
-            inside = np.abs(f) <= self.bandwidth / 2 * (1 + 1e-12)
+            is_inside = np.abs(f) <= self.bandwidth / 2 * (1 + 1e-12)
             f = np.clip(f, -self.bandwidth, self.bandwidth)  # squares of frequencies far outside would overflow
-            made = np.exp(-1j * np.pi * f**2 * (self.duration / self.bandwidth)) * inside
-            return np.conj(made) if self.kind == "down-chirp" else made
+            spectrum = np.exp(-1j * np.pi * f**2 * (self.duration / self.bandwidth)) * is_inside
+            return np.conj(spectrum) if self.kind == "down-chirp" else spectrum
         if self.kind == "tone":
             return np.sinc(f * self.duration).astype(np.complex128)
         return self._sampled_spectrum(f) / self._sampled_peak
@@ -173,10 +174,10 @@ def _largest_modulus(signal: np.ndarray) -> float:
     top = np.flatnonzero(
         (level >= NEAR_PEAK * level.max()) & (level >= np.roll(level, 1)) & (level >= np.roll(level, -1))
     )
-    found = float(level.max())
+    largest = float(level.max())
     turn = -2j * np.pi / (8 * n) * (np.arange(n) - (n - 1) / 2)
-    for at in top[np.argsort(-level[top])][:MOST_PEAKS]:
-        term, series = signal * np.exp(at * turn), []
+    for number in top[np.argsort(-level[top])][:MOST_PEAKS]:
+        term, series = signal * np.exp(number * turn), []
         for order in range(ORDERS):
             series.append(term.sum())
             term = term * turn / (order + 1)
@@ -185,5 +186,5 @@ def _largest_modulus(signal: np.ndarray) -> float:
             steps = x + width * np.linspace(-1, 1, 65)
             values = np.abs(np.polynomial.polynomial.polyval(steps, series))
             x, width = float(steps[int(values.argmax())]), width / 32
-            found = max(found, float(values.max()))
-    return found
+            largest = max(largest, float(values.max()))
+    return largest

@@ -13,7 +13,7 @@ from ..base import validation
 from . import triangles as geometry
 
 SECTIONS = 72  # default number of facets around an axis
-MOST_FACETS = 50_000_000  # of a shape
+MOST_FACETS = 50_000_000  # largest number of facets of a shape
 
 
 def revolved(profile: Sequence[tuple[float, float]], edge: float | None, sections: int | None) -> np.ndarray:
@@ -75,6 +75,6 @@ def geodesic(n: int) -> np.ndarray:
 
     both = [steps(i + j < n, ((0, 0), (1, 0), (0, 1))), steps(i + j < n - 1, ((1, 0), (1, 1), (0, 1)))]
     s, t = np.moveaxis(np.concatenate(both), -1, 0)[..., None]
-    whole = [((n - s - t) * m[a] + s * m[b] + t * m[c]) for m in (p, q) for a, b, c in faces]
-    out = np.concatenate(whole[:20]) + np.concatenate(whole[20:]) * ((1 + np.sqrt(5)) / 2)
+    corners = [((n - s - t) * m[a] + s * m[b] + t * m[c]) for m in (p, q) for a, b, c in faces]
+    out = np.concatenate(corners[:20]) + np.concatenate(corners[20:]) * ((1 + np.sqrt(5)) / 2)
     return out / np.sqrt(out[..., :1] ** 2 + out[..., 1:2] ** 2 + out[..., 2:] ** 2)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..base import validation
 
@@ -93,7 +93,7 @@ class Material:
         """True for a perfect conductor."""
         return self.conductivity == np.inf
 
-    def lobe(self, delta: ArrayLike) -> Any:
+    def lobe(self, delta: ArrayLike) -> NDArray[np.float64]:
         """The diagram D at angles delta between normal and bisector, rad (...); 0 for smooth materials."""
         delta = validation.values("delta", delta)
         with np.errstate(invalid="ignore", over="ignore"):  # infinite angles have no direction: NaN, as of NaN
@@ -107,7 +107,7 @@ class Material:
         """Integral of D cos over the hemisphere, sr: pi for an isotropic diagram; 1 where there is none."""
         return 1.0 if self.diagram in COHERENT else _solid_angle(self)
 
-    def permittivity(self, frequency: ArrayLike) -> Any:
+    def permittivity(self, frequency: ArrayLike) -> NDArray[np.complex128]:
         """Complex relative permittivity eps_r - j conductivity/(2 pi f eps0) at `frequency`, Hz, of its shape.
 
         eps_r may be complex itself: both losses add. The imaginary part is negative, because fields vary as
@@ -116,12 +116,12 @@ class Material:
         frequency = validation.values("frequency", frequency)
         if not (frequency > 0).all():
             raise ValueError(f"frequency reaches {frequency.min():g} Hz; it must be greater than 0")
-        out: np.ndarray
+        values: np.ndarray
         if self.conducting:
-            out = np.full(frequency.shape, np.inf, np.complex128)
+            values = np.full(frequency.shape, np.inf, np.complex128)
         else:
-            out = self.eps_r - 1j * self.conductivity / (2 * np.pi * VACUUM_PERMITTIVITY * frequency)
-        return np.asarray(out)[()]
+            values = self.eps_r - 1j * self.conductivity / (2 * np.pi * VACUUM_PERMITTIVITY * frequency)
+        return np.asarray(values)[()]
 
 
 # a name of MATERIALS, or the amplitude reflectivity of a perfect conductor; one for all facets, or one for each
@@ -138,56 +138,53 @@ def _solid_angle(material: Material) -> float:
     return float(np.pi * end / 2 * (weights * material.lobe(delta) * np.sin(2 * delta)).sum())
 
 
-def _number(name: str, value: Any, inf: bool) -> float:
+def _number(name: str, value: object, inf: bool) -> float:
     """A float, which may be infinite where `inf` is True; an error names the argument."""
     if inf and isinstance(value, (float, np.floating)) and value == np.inf:
         return np.inf
     return validation.number(name, value)
 
 
-def _lossy(value: Any) -> complex:
+def _lossy(value: complex) -> complex:
     """A complex eps_r; a float where its imaginary part is 0."""
     if np.ndim(value) or np.ma.is_masked(value):
         raise ValueError(f"eps_r must be a number, got {value!r:.80}")
-    out = complex(value)
-    if not np.isfinite(out):
-        raise ValueError(f"eps_r is {out:g}; it must be finite")
-    if out.imag > 0:
+    eps_r = complex(value)
+    if not np.isfinite(eps_r):
+        raise ValueError(f"eps_r is {eps_r:g}; it must be finite")
+    if eps_r.imag > 0:
         raise ValueError(
-            f"eps_r is {out:g}, whose positive imaginary part would be gain: fields vary as exp(+j 2 pi f t), and "
-            f"losses are negative; give {out.conjugate():g}"
+            f"eps_r is {eps_r:g}, whose positive imaginary part would be gain: fields vary as exp(+j 2 pi f t), and "
+            f"losses are negative; give {eps_r.conjugate():g}"
         )
-    return out if out.imag else out.real
-
-
-def _made(name: str, eps_r: float, conductivity: float) -> tuple[str, Material]:
-    return name, Material(eps_r, conductivity, name=name)
+    return eps_r if eps_r.imag else eps_r.real
 
 
 METAL = Material(name="metal")
 # Values at 10 GHz; docs/guide/scenes.md names the source of each. Add your own: MATERIALS["snow"] = Material(1.5).
-MATERIALS: dict[str, Material] = dict(
-    [
-        ("metal", METAL),
+MATERIALS: dict[str, Material] = {
+    material.name: material
+    for material in (
+        METAL,
         # ITU-R P.2040-3, table 3: eps_r = a f^b, conductivity = c f^d, f in GHz
-        _made("concrete", 5.24, 0.280),
-        _made("brick", 3.91, 0.0344),
-        _made("marble", 7.07, 0.0464),
-        _made("plasterboard", 2.73, 0.0739),
-        _made("wood", 1.99, 0.0554),
-        _made("glass", 6.31, 0.0787),
-        _made("dry soil", 3.0, 0.0497),
-        _made("moist soil", 11.9, 1.49),
-        _made("wet soil", 11.9, 2.99),
+        Material(5.24, 0.280, name="concrete"),
+        Material(3.91, 0.0344, name="brick"),
+        Material(7.07, 0.0464, name="marble"),
+        Material(2.73, 0.0739, name="plasterboard"),
+        Material(1.99, 0.0554, name="wood"),
+        Material(6.31, 0.0787, name="glass"),
+        Material(3.0, 0.0497, name="dry soil"),
+        Material(11.9, 1.49, name="moist soil"),
+        Material(11.9, 2.99, name="wet soil"),
         # Meissner and Wentz 2004, 2012 at 20 degrees Celsius, 0 and 35 g/kg of salt
-        _made("water", 60.7, 18.2),
-        _made("sea water", 55.9, 20.6),
+        Material(60.7, 18.2, name="water"),
+        Material(55.9, 20.6, name="sea water"),
         # von Hippel 1954: dry sandy soil, loss tangent 0.0036
-        _made("sand", 2.53, 0.0051),
+        Material(2.53, 0.0051, name="sand"),
         # Olkkonen 2016 (7 to 17 GHz); loss from the depth of 13 cm at 8 GHz of Jaselskis et al. 2003
-        _made("asphalt", 5.0, 0.046),
-    ]
-)
+        Material(5.0, 0.046, name="asphalt"),
+    )
+}
 
 
 def resolve(
@@ -200,43 +197,37 @@ def resolve(
     materials  materials in the same words
     Materials in the table have reflectivity 1: the second array holds it. ValueError names an unknown material.
     """
-    listed = None if materials is None else _listed(materials)
-    names = {m.name: (m, r) for m, r in listed or () if m.name}
-    given = _array(material)
-    if given.ndim and given.shape != shape:
-        raise ValueError(f"material has shape {given.shape}, wanted one for all or {shape}")
-    whole = given.dtype.kind in "iu"
-    if whole and listed is not None:
-        if given.size and not 0 <= given.min() <= given.max() < len(listed):
-            bad = given.min() if given.min() < 0 else given.max()
-            raise ValueError(f"material holds {bad}; whole numbers are indices into materials, 0 to {len(listed) - 1}")
-        index, kinds = given, listed
-    elif whole and given.ndim:
+    choices = None if materials is None else _checked_list(materials)
+    names = {m.name: (m, r) for m, r in choices or () if m.name}
+    assigned = _array(material)
+    if assigned.ndim and assigned.shape != shape:
+        raise ValueError(f"material has shape {assigned.shape}, wanted one for all or {shape}")
+    is_index = assigned.dtype.kind in "iu"
+    if is_index and choices is not None:
+        if assigned.size and not 0 <= assigned.min() <= assigned.max() < len(choices):
+            index_outside = assigned.min() if assigned.min() < 0 else assigned.max()
+            raise ValueError(
+                f"material holds {index_outside}; whole numbers are indices into materials, 0 to {len(choices) - 1}"
+            )
+        index, kinds = assigned, choices
+    elif is_index and assigned.ndim:
         raise ValueError(
             "material is an array of whole numbers; give the materials=[...] they are indices into, or floats from 0 "
             "to 1 for reflectivities"
         )
-    elif given.dtype.kind in "iuf":
-        value = _reflectivity(given)
-        return (
-            np.broadcast_to(np.int32(0), shape),
-            np.broadcast_to(value, shape),
-            (METAL,),
-        )
-    elif given.dtype.kind == "U":
-        words, index = np.unique(given, return_inverse=True)
-        index, kinds = index.reshape(given.shape), [_one(str(word), names) for word in words]
+    elif assigned.dtype.kind in "iuf":
+        value = _reflectivity(assigned)
+        return (np.broadcast_to(np.int32(0), shape), np.broadcast_to(value, shape), (METAL,))
+    elif assigned.dtype.kind == "U":
+        words, index = np.unique(assigned, return_inverse=True)
+        index, kinds = index.reshape(assigned.shape), [_with_reflectivity(str(word), names) for word in words]
     else:
-        places: dict[Any, int] = {}
-        index = np.array([places.setdefault(_key(m), len(places)) for m in given.flat], np.int32)
-        index, kinds = index.reshape(given.shape), [_one(m, names) for m in places]
+        places: dict[object, int] = {}
+        index = np.array([places.setdefault(_key(m), len(places)) for m in assigned.flat], np.int32)
+        index, kinds = index.reshape(assigned.shape), [_with_reflectivity(m, names) for m in places]
     table, place = merge([[m for m, _ in kinds]])
     factor = np.array([r for _, r in kinds])
-    return (
-        np.broadcast_to(place[0][index].astype(np.int32), shape),
-        np.broadcast_to(factor[index], shape),
-        table,
-    )
+    return (np.broadcast_to(place[0][index].astype(np.int32), shape), np.broadcast_to(factor[index], shape), table)
 
 
 def merge(tables: Sequence[Sequence[Material]]) -> tuple[tuple[Material, ...], list[np.ndarray]]:
@@ -257,28 +248,28 @@ def checked_table(materials: Sequence[Material], index: np.ndarray) -> tuple[tup
     for m in table:
         validation.instance("materials", m, Material)
     if index.size and not 0 <= index.min() <= index.max() < len(table):
-        bad = index.min() if index.min() < 0 else index.max()
-        raise ValueError(f"scene material holds {bad}; it is an index into materials, 0 to {len(table) - 1}")
+        index_outside = index.min() if index.min() < 0 else index.max()
+        raise ValueError(f"scene material holds {index_outside}; it is an index into materials, 0 to {len(table) - 1}")
     if all(m.reflectivity == 1 for m in table):
         return table, None
     factor = np.array([m.reflectivity for m in table])[index]
     return tuple(replace(m, reflectivity=1.0) for m in table), factor
 
 
-def _array(material: Any) -> np.ndarray:
+def _array(material: object) -> np.ndarray:
     """`material` as an array of numbers, of words, or of objects."""
     if isinstance(material, (Material, Mapping)) or material is None:
-        out = np.empty((), object)
-        out[()] = material
-        return out
+        array = np.empty((), object)
+        array[()] = material
+        return array
     validation.ndim("material", material)
-    out = np.asarray(material)
+    array = np.asarray(material)
     # NumPy would make strings of the numbers in a list of strings and numbers
-    mixed = out.dtype.kind == "U" and not isinstance(material, (str, np.ndarray, np.generic))
-    return np.asarray(material, object) if mixed or out.dtype.kind not in "iufU" else out
+    is_mixed = array.dtype.kind == "U" and not isinstance(material, (str, np.ndarray, np.generic))
+    return np.asarray(material, object) if is_mixed or array.dtype.kind not in "iufU" else array
 
 
-def _key(material: Any) -> Any:
+def _key(material: object) -> object:
     try:
         hash(material)
     except TypeError:
@@ -286,13 +277,13 @@ def _key(material: Any) -> Any:
     return material
 
 
-def _listed(materials: Any) -> list[tuple[Material, float]]:
+def _checked_list(materials: object) -> list[tuple[Material, float]]:
     if isinstance(materials, (str, Mapping)) or not isinstance(materials, Sequence) or not len(materials):
         raise ValueError(f"materials is {materials!r:.60}; give a list of materials, such as ['metal', 'concrete']")
-    return [_one(m, {}) for m in materials]
+    return [_with_reflectivity(m, {}) for m in materials]
 
 
-def _one(material: Any, names: Mapping[str, tuple[Material, float]]) -> tuple[Material, float]:
+def _with_reflectivity(material: object, names: Mapping[str, tuple[Material, float]]) -> tuple[Material, float]:
     """A material of reflectivity 1, and its reflectivity."""
     if isinstance(material, Material):
         return replace(material, reflectivity=1.0), material.reflectivity
@@ -301,16 +292,16 @@ def _one(material: Any, names: Mapping[str, tuple[Material, float]]) -> tuple[Ma
             return names[material]
         if material not in MATERIALS:
             raise _unknown(material, names)
-        return _one(MATERIALS[material], names)
+        return _with_reflectivity(MATERIALS[material], names)
     if isinstance(material, Mapping):
         raise _unknown(material, names)
     return METAL, float(_reflectivity(np.asarray(validation.number("material", material))))
 
 
-def _unknown(material: Any, names: Mapping[str, Any]) -> ValueError:
-    known = ", ".join(map(repr, [*names, *(n for n in MATERIALS if n not in names)]))
+def _unknown(material: object, names: Mapping[str, object]) -> ValueError:
+    choices = ", ".join(map(repr, [*names, *(n for n in MATERIALS if n not in names)]))
     return ValueError(
-        f"material is {material!r:.60}; known are {known}; or give a sarcl.Material, or a reflectivity from 0 to 1"
+        f"material is {material!r:.60}; known are {choices}; or give a sarcl.Material, or a reflectivity from 0 to 1"
     )
 
 

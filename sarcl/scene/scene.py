@@ -85,7 +85,7 @@ class Scene:
         if self.material is None:
             object.__setattr__(self, "material", np.broadcast_to(np.int32(0), (k,)))
         if self.point_roughness is None:
-            object.__setattr__(self, "point_roughness", _none(k))
+            object.__setattr__(self, "point_roughness", _no_displacements(k))
         shapes = {"positions": (n, 3), "triangles": (k, 3, 3), "amplitudes": (n,), "point_roughness": (k, 3, 3)}
         dtypes = {"amplitudes": np.complex128, "two_sided": np.bool_, "material": np.int32}
         for name in _ARRAYS:
@@ -93,16 +93,16 @@ class Scene:
             # read-only arrays are not copied
             if not isinstance(value, np.ndarray) or value.flags.writeable or value.dtype != dtype:
                 value = validation.sealed(validation.converted(f"scene {name}", value, dtype))
-            wanted = shapes.get(name, (k,))
-            if value.shape != wanted:
-                raise ValueError(f"scene {name} has shape {value.shape}, wanted {wanted}")
+            expected = shapes.get(name, (k,))
+            if value.shape != expected:
+                raise ValueError(f"scene {name} has shape {value.shape}, wanted {expected}")
             validation.finite(
                 f"scene {name}", value if any(value.strides) else value[:1]
             )  # broadcast: one number for all
             object.__setattr__(self, name, value)
         if (self.roughness < 0).any():
-            bad = int(np.argmin(self.roughness))
-            raise ValueError(f"roughness[{bad}] is {self.roughness[bad]:g} m; a standard deviation cannot be negative")
+            row = int(np.argmin(self.roughness))
+            raise ValueError(f"roughness[{row}] is {self.roughness[row]:g} m; a standard deviation cannot be negative")
         table, factor = checked_table(self.materials, self.material)
         if factor is not None:
             object.__setattr__(self, "reflectivity", validation.sealed(self.reflectivity * factor))
@@ -152,7 +152,7 @@ class Scene:
             "roughness": terrain.spread("roughness", roughness, (k,)),
             "two_sided": terrain.spread("two_sided", two_sided, (k,), np.bool_),
             "material": index,
-            "point_roughness": _none(k),
+            "point_roughness": _no_displacements(k),
         }
         if point_roughness is not None:
             parts["point_roughness"] = validation.array("point_roughness", point_roughness, np.float64, (k, 3, 3))
@@ -201,30 +201,25 @@ class Scene:
             scale = validation.number("scale", scale, above=0)
         position = validation.array("position", position, np.float64, (3,))
         rotate = geometry.rotation(rotation)
-        loaded = load(mesh, validation.flag("repair", repair), validation.flag("external", external))
-        parts = part_materials(material, loaded)
+        content = load(mesh, validation.flag("repair", repair), validation.flag("external", external))
+        parts = part_materials(material, content)
         if scale is None:
-            scale = 1.0 if loaded.unit is None else loaded.unit
+            scale = 1.0 if content.unit is None else content.unit
             if scale != 1:
-                size = float(np.ptp(loaded.triangles.reshape(-1, 3), axis=0).max()) * scale
+                size = float(np.ptp(content.triangles.reshape(-1, 3), axis=0).max()) * scale
                 warn(
                     f"the unit of this mesh is {scale:g} m, as its file says: its longest side is taken as {size:.4g} "
                     f"m. Give scale={scale:g} to confirm it, or another scale, m per unit, where the file is wrong"
                 )
         with np.errstate(over="ignore", invalid="ignore"):
-            placed = loaded.triangles * scale @ rotate.T + position
-        geometry.check_reach(f"corners of a mesh of scale {scale:g}", placed)
-        if not geometry.solid(placed).any():
+            corners = content.triangles * scale @ rotate.T + position
+        geometry.check_reach(f"corners of a mesh of scale {scale:g}", corners)
+        if not geometry.solid(corners).any():
             what = f"mesh file {Path(mesh).name!r}" if isinstance(mesh, (str, Path)) else "mesh"
             raise ValueError(
-                f"all {len(placed)} facets are degenerate (zero area); nothing would reflect: check the {what}"
+                f"all {len(corners)} facets are degenerate (zero area); nothing would reflect: check the {what}"
             )
-        scene = cls.facets(
-            placed,
-            **parts,
-            roughness=roughness,
-            two_sided=not loaded.closed,
-        )
+        scene = cls.facets(corners, **parts, roughness=roughness, two_sided=not content.closed)
         return scene if max_edge is None else scene.split(max_edge)
 
     @classmethod
@@ -249,8 +244,12 @@ class Scene:
         """
         points = terrain.grid(x, y, z)
         up = np.array([0.0, 0.0, 1.0])
-        made = cls.facets(**terrain.surface(points, up, material, materials, roughness, point_roughness))
-        return replace(made, heights=terrain.heights(points))
+        scene = cls.facets(
+            **terrain.surface(
+                points, up, material=material, materials=materials, roughness=roughness, point_roughness=point_roughness
+            )
+        )
+        return replace(scene, heights=terrain.heights(points))
 
     @classmethod
     def from_dem(
@@ -291,7 +290,11 @@ class Scene:
 
         tile = elevation.load(path, bounds=bounds, heights=heights, geoid=geoid, nodata=nodata, external=external)
         points, up = elevation.place(tile, frame, center)
-        return cls.facets(**terrain.surface(points, up, material, materials, roughness, point_roughness))
+        return cls.facets(
+            **terrain.surface(
+                points, up, material=material, materials=materials, roughness=roughness, point_roughness=point_roughness
+            )
+        )
 
     def __repr__(self) -> str:
         size = " x ".join(f"{s:.4g}" for s in self.bounds[1] - self.bounds[0])
@@ -392,7 +395,7 @@ class Scene:
         random = gaussian(self.triangles.reshape(-1, 3), seed, POINT_HEIGHTS).reshape(-1, 3, 1)
         moved = validation.sealed(self.triangles + random * self.point_roughness)
         heights = None if self.heights is None else terrain.raised(self.heights, self.triangles, moved)
-        return replace(self, triangles=moved, point_roughness=_none(len(moved)), heights=heights)
+        return replace(self, triangles=moved, point_roughness=_no_displacements(len(moved)), heights=heights)
 
     def part(self, which: np.ndarray) -> Scene:
         """The scene with only those of its facets for which `which`, bool (k,), is True."""
@@ -418,13 +421,15 @@ class Scene:
         belongs: dict[str, Any] = {
             n: validation.sealed(getattr(self, n)[row]) for n in ("reflectivity", "roughness", "two_sided", "material")
         }
-        return replace(self, triangles=validation.sealed(triangles), point_roughness=_none(len(row)), **belongs)
+        return replace(
+            self, triangles=validation.sealed(triangles), point_roughness=_no_displacements(len(row)), **belongs
+        )
 
 
 _ARRAYS = tuple(n for n in Scene.__dataclass_fields__ if n not in ("materials", "heights"))
 _FACET_ARRAYS = tuple(n for n in _ARRAYS if n not in ("positions", "amplitudes"))
 
 
-def _none(k: int) -> np.ndarray:
+def _no_displacements(k: int) -> np.ndarray:
     """Zero displacements for k facets, which occupy no memory."""
     return np.broadcast_to(0.0, (k, 3, 3))

@@ -16,7 +16,7 @@ parallelepiped, cylinder), Wan et al. Figs 6-8 (frustum, cuboid, cylinder), Zou 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 import numpy as np
@@ -55,7 +55,7 @@ def plate(
     """A rectangle of size (x, y), m, about the origin in z = 0, facing up: two facets, or more if `edge` requires."""
     x, y = _dimensions("size", size, 2)
     corners = np.array([[[-x, -y, 0], [x, -y, 0]], [[-x, y, 0], [x, y, 0]]]) / 2
-    return _placed(geometry.of_grid(corners), edge, two_sided=two_sided, **options)
+    return _place(geometry.of_grid(corners), edge, two_sided=two_sided, **options)
 
 
 def disc(
@@ -68,7 +68,7 @@ def disc(
 ) -> Scene:
     """A circular disc about the origin in z = 0, facing up."""
     radius = _length("radius", radius)
-    return _revolved([(radius, 0), (0, 0)], edge, sections, two_sided=two_sided, **options)
+    return _revolve([(radius, 0), (0, 0)], edge, sections, two_sided=two_sided, **options)
 
 
 def box(size: ArrayLike, *, edge: float | None = None, **options: Unpack[ClosedOptions]) -> Scene:
@@ -85,7 +85,7 @@ def box(size: ArrayLike, *, edge: float | None = None, **options: Unpack[ClosedO
             face[..., first] = [[low[first], high[first]]] * 2
             face[..., second] = [[low[second]] * 2, [high[second]] * 2]
             sides.append(geometry.of_grid(face))
-    return _placed(np.concatenate(sides), edge, **options)
+    return _place(np.concatenate(sides), edge, **options)
 
 
 def cylinder(
@@ -98,7 +98,7 @@ def cylinder(
 ) -> Scene:
     """An upright circular cylinder with its lids."""
     radius, height = _length("radius", radius), _length("height", height)
-    return _revolved([(0, 0), (radius, 0), (radius, height), (0, height)], edge, sections, **options)
+    return _revolve([(0, 0), (radius, 0), (radius, height), (0, height)], edge, sections, **options)
 
 
 def cone(
@@ -111,7 +111,7 @@ def cone(
 ) -> Scene:
     """An upright circular cone with its base."""
     radius, height = _length("radius", radius), _length("height", height)
-    return _revolved([(0, 0), (radius, 0), (0, height)], edge, sections, **options)
+    return _revolve([(0, 0), (radius, 0), (0, height)], edge, sections, **options)
 
 
 def frustum(
@@ -126,7 +126,7 @@ def frustum(
     """A truncated cone of radii `bottom` and `top` with its lids; sections=4 makes it a truncated pyramid."""
     bottom, top = _length("bottom", bottom), _length("top", top)
     height = _length("height", height)
-    return _revolved([(0, 0), (bottom, 0), (top, height), (0, height)], edge, sections, **options)
+    return _revolve([(0, 0), (bottom, 0), (top, height), (0, height)], edge, sections, **options)
 
 
 def sphere(
@@ -140,20 +140,23 @@ def sphere(
     if edge is not None and facets is not None:
         raise ValueError("sphere takes edge or facets, not both: one follows from the other")
     if edge is None:
-        n = _cuts(validation.count("facets", 2000 if facets is None else facets))
-        return _placed(radius * _solids.geodesic(n), None, **options)
+        n = int(np.ceil(np.sqrt(validation.count("facets", 2000 if facets is None else facets) / 20)))
+        return _place(radius * _solids.geodesic(n), None, **options)
     edge = validation.number("edge", edge, above=0)
     # from the icosahedron's edge; facets in the middle of its faces are larger
     n = max(1, int(np.ceil(min(1.05 * radius / edge, 1e9))))
     while (longest := radius * geometry.edges(unit := _solids.geodesic(n)).max()) > edge:
         n = max(n + 1, int(n * longest / edge))
-    return _placed(radius * unit, None, **options)
+    return _place(radius * unit, None, **options)
 
 
 def tank(
-    size: ArrayLike = _tank.SIZE, *, edge: float | None = None, sections: int | None = None,
+    size: ArrayLike = _tank.SIZE,
+    *,
+    edge: float | None = None,
+    sections: int | None = None,
     **options: Unpack[ClosedOptions],
-) -> Scene:  # fmt: skip
+) -> Scene:
     """A tank of overall size (x, y, z), m, its gun forward along x: the complex target of Zou et al. 2021, table 2.
 
     Closed bodies that overlap: hull with a sloped front, tracks, side boxes, turret, gun, cupola with a mast, drums at
@@ -162,19 +165,17 @@ def tank(
     """
     stretch = np.array(_dimensions("size", size, 3)) / _tank.SIZE
     finest = None if edge is None else validation.number("edge", edge, above=0) / float(stretch.max())
-    return _placed(_tank.triangles(finest, sections) * stretch, edge, **options)
+    return _place(_tank.triangles(finest, sections) * stretch, edge, **options)
 
 
-def _cuts(facets: int) -> int:
-    return int(np.ceil(np.sqrt(facets / 20)))
-
-
-def _revolved(profile: Any, edge: float | None, sections: int | None, **options: Any) -> Scene:
+def _revolve(
+    profile: Sequence[tuple[float, float]], edge: float | None, sections: int | None, **options: Unpack[ClosedOptions]
+) -> Scene:
     """The surface of revolution about the z axis of a line of (radius, z), from bottom to top."""
-    return _placed(_solids.revolved(profile, edge, sections), edge, **options)
+    return _place(_solids.revolved(profile, edge, sections), edge, **options)
 
 
-def _placed(
+def _place(
     triangles: np.ndarray,
     edge: float | None,
     *,
@@ -191,10 +192,10 @@ def _placed(
     return scene.split(min(validation.number("edge", edge, above=0), geometry.FARTHEST))
 
 
-def _length(name: str, value: Any) -> float:
-    out = validation.number(name, value, above=0)
-    geometry.check_reach(name, np.array(out))
-    return out
+def _length(name: str, value: object) -> float:
+    length = validation.number(name, value, above=0)
+    geometry.check_reach(name, np.array(length))
+    return length
 
 
 def _dimensions(name: str, size: ArrayLike, n: int) -> list[float]:
@@ -206,10 +207,10 @@ def _dimensions(name: str, size: ArrayLike, n: int) -> list[float]:
 SHAPES = (plate, disc, box, cylinder, cone, frustum, sphere, tank)
 
 
-def _spell_out(shape: Any) -> None:
+def _spell_out(shape: Callable[..., Scene]) -> None:
     """Show the keywords of `options` to help() and scenario files, as the signature of the shape."""
     own = inspect.signature(shape)
-    more = [p for call in (_placed, Scene.facets) for p in inspect.signature(call).parameters.values()]
+    more = [p for call in (_place, Scene.facets) for p in inspect.signature(call).parameters.values()]
     parameters = {p.name: p for p in more if p.kind is p.KEYWORD_ONLY and p.name != "point_roughness"}
     parameters["two_sided"] = parameters["two_sided"].replace(default=False)
     parameters.update(own.parameters)

@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, DTypeLike
 
 from ..base import boxes, validation
 from . import triangles as geometry
-from .material import resolve
+from .material import FacetMaterials, MaterialLike, resolve
 
 log = logging.getLogger(__name__)
 
 Heights = tuple[np.ndarray, np.ndarray, np.ndarray]  # x (n_x,), y (n_y,), both increasing, and z (n_y, n_x), m
-ON = 1e-9  # of a terrain's size: corners no farther from it lie on it
+ON = 1e-9  # distance to a terrain over its size, within which corners lie on it
 
 
-def grid(x: Any, y: Any, z: Any) -> np.ndarray:
+def grid(x: ArrayLike, y: ArrayLike, z: ArrayLike | Callable[[np.ndarray, np.ndarray], ArrayLike]) -> np.ndarray:
     """Points, m (n_y, n_x, 3), of heights z (n_y, n_x), or a function z(x, y), over increasing x (n_x,), y (n_y,)."""
     x = validation.array("x", x, np.float64, ("n_x",))
     y = validation.array("y", y, np.float64, ("n_y",))
@@ -42,7 +44,13 @@ def heights(points: np.ndarray) -> Heights:
 
 
 def surface(
-    points: np.ndarray, up: np.ndarray, material: Any, materials: Any, roughness: Any, point_roughness: Any
+    points: np.ndarray,
+    up: np.ndarray,
+    *,
+    material: FacetMaterials,
+    materials: Sequence[MaterialLike] | None,
+    roughness: ArrayLike,
+    point_roughness: ArrayLike,
 ) -> dict[str, Any]:
     """Arguments of Scene.facets for a grid of points, m (n, m, 3): two facets per cell, none where a point is NaN.
 
@@ -57,31 +65,31 @@ def surface(
         raise ValueError(f"point_roughness reaches {deviation.min():g} m; a standard deviation cannot be negative")
     triangles = geometry.of_grid(points)
     up = np.broadcast_to(up, points.shape)
-    good = np.isfinite(triangles).all(axis=(1, 2))
-    if not good.any():
+    has_data = np.isfinite(triangles).all(axis=(1, 2))
+    if not has_data.any():
         raise ValueError("no cell has heights at all its corners; nothing would reflect")
-    if not good.all():
-        log.info("left out %d of %d facets: no data", len(good) - good.sum(), len(good))
-    moves = geometry.of_grid(deviation[..., None] * up)[good] if deviation.any() else None
-    triangles = triangles[good]
-    row, column = np.divmod(np.argmax(good) // 2, cells[1])
+    if not has_data.all():
+        log.info("left out %d of %d facets: no data", len(has_data) - has_data.sum(), len(has_data))
+    displacements = geometry.of_grid(deviation[..., None] * up)[has_data] if deviation.any() else None
+    triangles = triangles[has_data]
+    row, column = np.divmod(np.argmax(has_data) // 2, cells[1])
     a, b, c = triangles[0]
     if np.cross(b - a, c - a) @ up[row, column] < 0:  # rows run from north to south: reverse the winding
         triangles = triangles[:, ::-1]
-        moves = None if moves is None else moves[:, ::-1]
-    index, factor, roughness = (np.repeat(v.reshape(-1), 2)[good] for v in (index, factor, roughness))
+        displacements = None if displacements is None else displacements[:, ::-1]
+    index, factor, roughness = (np.repeat(v.reshape(-1), 2)[has_data] for v in (index, factor, roughness))
     return {
         "triangles": triangles,
         "material": index,
         "materials": table,
         "reflectivity": factor,
         "roughness": roughness,
-        "point_roughness": moves,
+        "point_roughness": displacements,
         "two_sided": False,
     }
 
 
-def spread(name: str, value: Any, shape: tuple[int, ...], dtype: Any = np.float64) -> np.ndarray:
+def spread(name: str, value: object, shape: tuple[int, ...], dtype: DTypeLike = np.float64) -> np.ndarray:
     """`value` for every facet, cell or point: one number for all, or an array of `shape`; read-only."""
     if dtype == np.bool_:
         value = validation.flags(name, value)
@@ -109,9 +117,9 @@ def check_above(name: str, grid: Heights, ends: np.ndarray) -> None:
     """Raise ValueError for an antenna below the terrain, at positions `ends`, m (n, 3)."""
     high = above(grid, ends)
     if high.min() < 0:
-        at = int(high.argmin())
+        pulse = int(high.argmin())
         raise ValueError(
-            f"{name}[{at}] stands {-high[at]:.3g} m under the terrain; raise the track, or check that track and "
+            f"{name}[{pulse}] stands {-high[pulse]:.3g} m under the terrain; raise the track, or check that track and "
             "heights refer to the same surface"
         )
 
@@ -153,12 +161,12 @@ def clear_of(grid: Heights, triangles: np.ndarray, on: np.ndarray, ends: list[np
     """
     if not is_overlooked(grid, boxes.box(triangles.reshape(-1, 3)), ends):
         return np.zeros(len(triangles), bool)
-    slope, out = steepest(grid), np.array(on)
-    rest = np.flatnonzero(~out)
-    longest = np.maximum.reduce(geometry.edges(triangles[rest]))
-    heights = above(grid, triangles[rest].reshape(-1, 3)).reshape(-1, 3)
-    out[rest] = heights.min(axis=1) >= slope * longest
-    return out
+    slope, is_clear = steepest(grid), np.array(on)
+    others = np.flatnonzero(~is_clear)
+    longest = np.maximum.reduce(geometry.edges(triangles[others]))
+    heights = above(grid, triangles[others].reshape(-1, 3)).reshape(-1, 3)
+    is_clear[others] = heights.min(axis=1) >= slope * longest
+    return is_clear
 
 
 def facets_on(grid: Heights, triangles: np.ndarray) -> np.ndarray | None:
@@ -170,9 +178,9 @@ def facets_on(grid: Heights, triangles: np.ndarray) -> np.ndarray | None:
     for axis, ends in enumerate((x, y)):
         near = np.clip(corners[:, axis], ends[0], ends[-1])
         corners[:, axis] = np.where(np.abs(near - corners[:, axis]) <= ON * size, near, corners[:, axis])
-    on = np.asarray((np.abs(above(grid, corners)) <= ON * size).reshape(-1, 3).all(axis=1))
-    whole = geometry.areas(geometry.of_grid(_points(grid))).sum()
-    return on if abs(geometry.areas(triangles[on]).sum() - whole) <= 1e-6 * whole else None
+    is_on = np.asarray((np.abs(above(grid, corners)) <= ON * size).reshape(-1, 3).all(axis=1))
+    area = geometry.areas(geometry.of_grid(np.stack([*np.meshgrid(x, y), z], axis=-1))).sum()
+    return is_on if abs(geometry.areas(triangles[is_on]).sum() - area) <= 1e-6 * area else None
 
 
 def raised(grid: Heights, before: np.ndarray, after: np.ndarray) -> Heights | None:
@@ -180,13 +188,9 @@ def raised(grid: Heights, before: np.ndarray, after: np.ndarray) -> Heights | No
     x, y, z = grid
     before, after = before.reshape(-1, 3), after.reshape(-1, 3)
     column, row = (np.clip(np.searchsorted(a, v), 0, len(a) - 1) for a, v in zip((x, y), before.T[:2], strict=True))
-    mine = (x[column] == before[:, 0]) & (y[row] == before[:, 1]) & (z[row, column] == before[:, 2])
-    if (before[mine, :2] != after[mine, :2]).any():
+    is_grid_point = (x[column] == before[:, 0]) & (y[row] == before[:, 1]) & (z[row, column] == before[:, 2])
+    if (before[is_grid_point, :2] != after[is_grid_point, :2]).any():
         return None
-    out = z.copy()
-    out[row[mine], column[mine]] = after[mine, 2]
-    return x, y, validation.sealed(out)
-
-
-def _points(grid: Heights) -> np.ndarray:
-    return np.stack([*np.meshgrid(*grid[:2]), grid[2]], axis=-1)
+    heights = z.copy()
+    heights[row[is_grid_point], column[is_grid_point]] = after[is_grid_point, 2]
+    return x, y, validation.sealed(heights)

@@ -66,7 +66,7 @@ def test_chosen_curves_are_dots(figures):
 
 def test_a_picture_shows_its_first_row_at_the_bottom_white_on_top_of_its_scale(figures):
     db = np.array([[0.0, -10.0], [-20.0, -80.0], [-40.0, -40.0]])
-    made = pixels(plots.picture(db, (0, 2), (0, 3), "x", "y", floor_db=-40, box=(0.5, 0.5)))
+    made = pixels(plots.picture(db, plots.PlotAxis("x", 0, 2), plots.PlotAxis("y", 0, 3), box=(0.5, 0.5)))
     axes = figures[0].axes[0]
     for place, level in (((0.8, 0.8), 255), ((1.5, 0.5), 191), ((0.5, 1.5), 128), ((1.5, 1.5), 0), ((0.5, 2.5), 0)):
         column, row = axes.transData.transform(place)
@@ -77,7 +77,7 @@ def test_a_picture_shows_its_first_row_at_the_bottom_white_on_top_of_its_scale(f
 
 @pytest.mark.parametrize("x, y", [((-40.0, 40.0), (-15.0, 15.0)), ((-10.0, 10.0), (-12.0, 12.0)), ((0, 1), (0, 30))])
 def test_axes_of_equal_units_have_equal_scales(figures, x, y):
-    plots.picture(np.zeros((3, 4)), x, y, "m", "m", floor_db=-40, equal=True)
+    plots.picture(np.zeros((3, 4)), plots.PlotAxis("m", *x), plots.PlotAxis("m", *y), equal=True)
     axes = figures[0].axes[0]
     corners = axes.transData.transform([(x[0], y[0]), (x[1], y[1])])
     across, up = np.diff(corners, axis=0)[0] / (x[1] - x[0], y[1] - y[0])

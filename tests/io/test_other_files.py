@@ -249,14 +249,6 @@ def test_virtual_rasters_as_gdal_writes_them_are_read(inside, crs):
     assert np.array_equal(np.nan_to_num(found), wanted)
 
 
-def test_virtual_rasters_that_read_one_another_many_times_are_refused(inside):
-    tif(inside / "0.vrt")
-    for level in range(1, 8):
-        (inside / f"{level}.vrt").write_text(raster(source=100 * BESIDE.replace("a.tif", f"{level - 1}.vrt")))
-    with pytest.raises(ValueError, match=r"'7\.vrt' reads more than 100,000 rasters; give those of the part"):
-        sarcl.ElevationModel.read(inside / "7.vrt", heights="ellipsoid")
-
-
 def test_rasters_that_name_themselves_or_an_address_are_refused(inside):
     pytest.importorskip("rasterio")
     vrt(inside / "a.vrt", "a.vrt")

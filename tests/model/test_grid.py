@@ -180,3 +180,11 @@ def test_bad_grids_say_what_was_wanted(name):
     make, message = BAD[name]
     with pytest.raises(ValueError, match=message):
         make()
+
+
+def test_the_spacing_and_the_normal_of_a_zero_doppler_grid_are_those_of_its_positions():
+    x, y = np.meshgrid(2.0 * np.arange(6), 3.0 * np.arange(5))
+    grid = sarcl.ImageGrid.zero_doppler(np.arange(5) / 100, 7e5 + np.arange(6), np.stack([x, y, 0 * x], axis=-1))
+    for pixel in ((0, 0), (2, 3), (4, 5)):
+        assert grid.spacing_at(*pixel) == pytest.approx((3, 2))
+        assert grid.normal_at(*pixel) == pytest.approx((0, 0, 1))

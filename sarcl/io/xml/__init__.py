@@ -1,8 +1,8 @@
-"""XML files of others, whose size and contents are bounded before they are used.
+"""XML files of others, whose contents are checked before they are used.
 
 For other folders:
 
-    parser           elements of a file of bounded size, depth and number of elements
+    parser           elements of a file without a document type
     virtual_rasters  sources of virtual rasters (VRT), where all else they hold is known to be harmless
 """
 

@@ -73,18 +73,18 @@ def sources(path: Path) -> list[Path]:
         raise Refused(f"{exc}; export it again, or give its sources") from None
     if root.tag != "VRTDataset":
         raise Refused(f"is XML of the kind {root.tag!r:.60}, which names a raster elsewhere; give that raster")
-    found = []
+    files = []
     for element in root.iter():
         name = element.tag.lower()
         if name in SOURCE_NAMES:
-            found.append(_source(path, element))
+            files.append(_source(path, element))
         elif element is not root:
             _check(name, f"<{element.tag}>", element.text)
         for key, text in element.attrib.items():
             _check(key.lower(), f"<{element.tag} {key}>", text)
             if name == "option" and text not in OPTIONS:
                 raise Refused(f"has the option {text!r:.60}, {REMEDY}")
-    return found
+    return files
 
 
 def _check(name: str, shown: str, text: str | None) -> None:
