@@ -89,7 +89,7 @@ def choose(
     direct = _direct(task, tolerance, on, float64)
     if (
         method == "direct"
-        or task.taper is not None
+        or task.weighs_pixels
         or direct.dtype != np.complex64
         or task.pairs < cost_model.SEARCH_PAYS
     ):
