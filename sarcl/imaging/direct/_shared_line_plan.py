@@ -10,7 +10,8 @@ from ...numerics import cost_model, error_bounds, interpolation
 from ...numerics.cost_model import DeviceClass
 from ...numerics.interpolation import Interpolator
 from ...numerics.pulse_geometry import PulseGeometry
-from .line_plan import FINES, MOST_CHOSEN, MOST_FIXED, LinePlan, curvatures, profile_interpolator, series
+from ._line_curvature import curvatures
+from .line_plan import FINES, MOST_CHOSEN, MOST_FIXED, LinePlan, profile_interpolator, series
 
 SIDES = (64, 32)  # pixels along a side of a tile
 GROUP_SIZES = (64, 32, 16, 8)  # pulses per group

@@ -20,8 +20,9 @@ from ...opencl.launch_numbers import launch_numbers
 from ..tiling.lines import LineTiling
 from ..tiling.tiling import Tiling
 from . import _shared_line_plan, line_plan
+from ._line_curvature import steps
 from ._shared_line_plan import SharedLinePlan
-from .line_plan import LinePlan, steps
+from .line_plan import LinePlan
 
 CHUNK = 64  # rows added in float32 before the compensated total; blocks of rows are multiples of it
 ENTRY = 24  # numbers that a pulse takes in the record of its group: N_ENTRY of kernels/line_schedule.clh
