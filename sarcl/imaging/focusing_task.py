@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -83,6 +83,11 @@ class FocusingTask:
         return float((self.raw.frequency + self.raw.n_samples * self.raw.frequency_step).max())
 
     @property
+    def bandwidth(self) -> float:
+        """Largest bandwidth of a row, Hz."""
+        return float(self.raw.bandwidth.max())
+
+    @property
     def skip_flags(self) -> int:
         """SKIP_WINDOW and SKIP_BEAM of the kernels."""
         return int("range window" in self.skips) + 2 * int("beam" in self.skips)
@@ -93,7 +98,7 @@ class FocusingTask:
         return self.raw.n_rows * self.grid.size
 
 
-def beam_of(raw: PhaseHistory, beam: Any, center: np.ndarray) -> tuple[np.ndarray | None, float]:
+def beam_of(raw: PhaseHistory, beam: object, center: np.ndarray) -> tuple[np.ndarray | None, float]:
     """Unit directions (n_rows, 3), or None where every point is seen, and full angle, rad, of `beam`.
 
     beam    None, an angle about the line from the transmitter to `center`, m (3,), or (angle, direction)
@@ -101,27 +106,27 @@ def beam_of(raw: PhaseHistory, beam: Any, center: np.ndarray) -> tuple[np.ndarra
     """
     if beam is None:
         return None, 2 * np.pi
-    pointed = isinstance(beam, (tuple, list))
-    if pointed and len(beam) != 2:
-        raise ValueError(f"beam has {len(beam)} parts; give an angle in rad, or (angle, direction)")
-    name = "beam[0]" if pointed else "beam"
-    angle = number(name, beam[0] if pointed else beam, above=0)
+    parts = beam if isinstance(beam, (tuple, list)) else None
+    if parts is not None and len(parts) != 2:
+        raise ValueError(f"beam has {len(parts)} parts; give an angle in rad, or (angle, direction)")
+    name = "beam" if parts is None else "beam[0]"
+    angle = number(name, beam if parts is None else parts[0], above=0)
     if angle > 2 * np.pi:
         raise ValueError(f"{name} is {angle:g} rad; a full angle is at most 2 pi: give radians")
-    if pointed:
-        given = converted("beam[1]", beam[1], np.float64)
-        if given.shape not in ((3,), (raw.n_rows, 3)):
-            raise ValueError(f"beam[1] has shape {given.shape}, wanted (3,) or one direction per row ({raw.n_rows}, 3)")
-        finite("beam[1]", given)
-        toward = np.broadcast_to(given, (raw.n_rows, 3))
+    if parts is not None:
+        axis = converted("beam[1]", parts[1], np.float64)
+        if axis.shape not in ((3,), (raw.n_rows, 3)):
+            raise ValueError(f"beam[1] has shape {axis.shape}, wanted (3,) or one direction per row ({raw.n_rows}, 3)")
+        finite("beam[1]", axis)
+        toward = np.broadcast_to(axis, (raw.n_rows, 3))
     else:
         toward = center - raw.tx
     largest = np.abs(toward).max(axis=1, keepdims=True)  # first, so that squares neither overflow nor vanish
     if not largest.all():
         row = int(np.argmin(largest))
-        if not pointed:
+        if parts is None:
             raise ValueError(f"tx[{row}] is at the grid's centre, so its beam points nowhere; give (angle, direction)")
-        which = f"[{row}]" if np.ndim(beam[1]) == 2 else ""
+        which = f"[{row}]" if np.ndim(parts[1]) == 2 else ""
         raise ValueError(f"beam[1]{which} is (0, 0, 0); a direction needs a length")
     if angle == 2 * np.pi:
         return None, angle

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,51 +21,50 @@ from ..focusing_task import FocusingTask
 from ..pixel_taper import TaperOnDevice
 from ..tiling.lines import LineTiling
 from ..tiling.of_grid import tiling_of
-from ..tiling.tiling import Tiling
+from ..tiling.tiling import FlatImage, Tiling
 from . import _shared_line_plan, line_plan
 from .line_plan import LinePlan
 from .tile_kernels import CHUNK, kernel_of
 
+if TYPE_CHECKING:
+    from ...opencl.device import Buffer
 
-def make_plan(task: FocusingTask, tolerance: float, on: DeviceClass = CPU) -> tuple[Plan | LinePlan, Tiling]:
+LEAST_COST = 0.9  # cost per contribution below that of every plan pixel by pixel
+
+
+def make_plan(task: FocusingTask, tolerance: float, devices: DeviceClass = CPU) -> tuple[Plan | LinePlan, Tiling]:
     """The cheapest plan whose predicted error is at most `tolerance`, and the tiling of the grid that it uses.
 
-    on  the devices that follow the plan
+    devices  those that follow the plan
     ToleranceUnreachable names the best tolerance that can be met.
     """
-    raw, grid = task.raw, task.grid
-    highest, bandwidth = task.highest, float(raw.bandwidth.max())
-    lined: LinePlan | None = None
+    grid = task.grid
+    by_lines: LinePlan | None = None
     if not task.weighs_pixels and grid.is_plane:  # lines share the weights of their pulses
-        if on.lanes:
-            lined = line_plan.choose(
-                tolerance, grid, task.antennas, n_samples=raw.n_samples, bandwidth=bandwidth, highest=highest
-            )
-        elif on.local_memory and task.pairs >= cost_model.SHARING_PAYS:
-            lined = _shared_line_plan.choose(
-                tolerance, grid, task.antennas, n_samples=raw.n_samples, bandwidth=bandwidth, highest=highest,
-                on=on,
-            )  # fmt: skip
-    if lined is not None and not task.resolves_beam(LineTiling(grid, lined.side).radius):
-        lined = None
-    if lined is not None and lined.cost < 0.9:  # no other plan costs less
-        return lined, LineTiling(grid, lined.side)
+        if devices.lanes:
+            by_lines = line_plan.choose(task, task.antennas, tolerance)
+        elif devices.local_memory and task.pairs >= cost_model.SHARING_PAYS:
+            by_lines = _shared_line_plan.choose(task, tolerance, devices)
+    if by_lines is not None and not task.resolves_beam(LineTiling(grid, by_lines.side).radius):
+        by_lines = None
+    if by_lines is not None and by_lines.cost < LEAST_COST:
+        return by_lines, LineTiling(grid, by_lines.side)
     tilings = {side**2: tiling_of(grid, side) for side in (32, 16, 8)}
     plan = cheapest(
         tolerance,
         [(n, tiling.radius) for n, tiling in tilings.items() if n == 64 or task.resolves_beam(tiling.radius)],
         distance=task.antennas.distance(grid.bounds),
-        frequency=highest,
-        bandwidth=bandwidth,
-        n_samples=raw.n_samples,
+        frequency=task.highest,
+        bandwidth=task.bandwidth,
+        n_samples=task.raw.n_samples,
         points_per_row=grid.size,
         chunk=CHUNK,
         least_tolerance=0.0,
-        gathering=on.gathering,
-        native_error=on.native_error if on.native_pays(tolerance) else None,
+        gathering=devices.gathering,
+        native_error=devices.native_error if devices.native_pays(tolerance) else None,
     )
-    if lined is not None and lined.cost < plan.cost:
-        return lined, LineTiling(grid, lined.side)
+    if by_lines is not None and by_lines.cost < plan.cost:
+        return by_lines, LineTiling(grid, by_lines.side)
     return plan, tilings[plan.per_tile]
 
 
@@ -116,7 +115,7 @@ class Direct(DirectEngine):
         return max(1, int(self._shares(nbytes)[1] / (pixel_bytes * self.tiling.per_tile)))
 
     def fill(
-        self, first: int, last: int, flat: Any, budget: float, clock: Clock, on_progress: Callable[[float], None]
+        self, first: int, last: int, flat: FlatImage, budget: float, clock: Clock, on_progress: Callable[[float], None]
     ) -> Skipped:
         """Focus bands first ... last - 1 into `flat`; see engine.Engine."""
         tiling = self.tiling
@@ -139,7 +138,7 @@ class Direct(DirectEngine):
 
     def add_up(
         self, tiles: Tiles, budget: float, clock: Clock, on_progress: Callable[[float], None]
-    ) -> tuple[Any, np.ndarray]:
+    ) -> tuple[Buffer, np.ndarray]:
         """Add all rows to these tiles: their sums (4, pixels) on the device, and rows left out of each (2, n_tiles)."""
         device, raw, kernels, stride = self.device, self.task.raw, self.kernels, self.profiles.stride
         for_rows, _, for_constants = self._shares(budget)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 from ...base.errors import ToleranceUnreachable
 from ...model.image_grid import ImageGrid
@@ -12,14 +12,20 @@ from ...numerics import cost_model, error_bounds, interpolation, interpolator_ch
 from ...numerics.cost_model import DeviceClass
 from ...numerics.interpolation import Interpolator
 from ...numerics.pulse_geometry import PulseGeometry
-from ._line_curvature import curvatures
+from ..focusing_task import FocusingTask
+from ._line_curvature import GroupCurvature, curvatures
 
 LOCAL_BYTES = 60_000  # bytes of local memory that a group of pulses may take
 SIDES = (64, 32, 16)  # pixels along a side of a tile
 FINES = (1, 2, 4, 8)  # samples of a line's profile per pixel
 GROUP_SIZES = (16, 8, 4)  # pulses per group
+MOST_LINES = 512  # lines of a tile times pulses of a group, at most: their profiles lie in local memory together
 MOST_FIXED = 0.7  # largest share of a tolerance for errors that no interpolator changes
 MOST_CHOSEN = 0.9  # the same with the errors of a line's interpolators; the rest is for that of the range profile
+SERIES_SHARE = 0.1  # share of a tolerance up to which the range series ends at its second order
+SAMPLING_MARGIN = 1.2  # ratio of a line's sampling rate to its bandwidth, at least, so that short interpolators suffice
+SLOPE_ERROR = 8  # ratio of the error of the slopes of weights to that of the weights
+SAMPLED_SIDES, SAMPLED_ENDS = 1.3, 8  # pixels that the samples of a line reach over: so many sides, and so many more
 
 
 def components(beam: bool) -> int:
@@ -59,7 +65,7 @@ class LinePlan:
     predicted_error: float
     cost: float
 
-    def describe(self, method: str) -> dict[str, Any]:
+    def describe(self, method: str) -> dict[str, object]:
         """The plan in words and numbers, for a report."""
         return {
             "method": method,
@@ -94,80 +100,105 @@ def possible(grid: ImageGrid, on: DeviceClass) -> bool:
     return on.lanes and grid.is_plane
 
 
-def series(tolerance: float, radius: float, distance: float, highest: float) -> tuple[int, float]:
-    """Order of the range series, and its phase error, rad."""
-    errors = {order: error_bounds.series_error(radius, distance, highest, order) for order in (2, 3)}
-    order = 2 if errors[2] < 0.1 * tolerance else 3
-    return order, errors[order]
-
-
-def profile_interpolator(error: float, n_samples: int, reads: float) -> tuple[Interpolator, int, float] | None:
-    """As interpolator_choice.choose_interpolator; None where it finds nothing: other lines may leave more to the
-    interpolator."""
-    try:
-        return interpolator_choice.choose_interpolator(error, n_samples, reads)
-    except ToleranceUnreachable:
-        return None
-
-
 def choose(
-    tolerance: float,
-    grid: ImageGrid,
+    task: FocusingTask,
     antennas: PulseGeometry,
+    tolerance: float,
     *,
-    n_samples: int,
-    bandwidth: float,
-    highest: float,
     source: tuple[Interpolator, int] | None = None,
     sides: tuple[int, ...] = SIDES,
 ) -> LinePlan | None:
     """The cheapest LinePlan whose predicted error is at most `tolerance`, or None.
 
-    highest  highest frequency, Hz
-    source   interpolator and length of profiles that exist already; None: they are chosen too
-    sides    sides of tiles to choose from, pixels
+    antennas  of the pulses: the rows of the task, or those that are kept of them
+    source    interpolator and length of profiles that exist already; None: they are chosen too
+    sides     sides of tiles to choose from, pixels
     """
-    distance = antennas.distance(grid.bounds)
-    best: LinePlan | None = None
-    choices = [(s, g) for s in sides for g in GROUP_SIZES if s * g <= 512]
-    for side, group, curvature in curvatures(grid, antennas, choices, highest, distance):
-        radius = curvature.radius
-        order, fixed = series(tolerance, radius, distance, highest)
-        fixed += error_bounds.phase_rounding(0.0, highest, True) * 2
-        fixed += error_bounds.position_rounding(radius, bandwidth, False)
-        fixed += error_bounds.curvature_rounding(radius, distance, highest)
-        if not fixed <= MOST_FIXED * tolerance:
+    tiles = [(side, group) for side in sides for group in GROUP_SIZES if side * group <= MOST_LINES]
+    plans = (
+        plan for curvature in curvatures(task, antennas, tiles) for plan in _plans(task, tolerance, curvature, source)
+    )
+    return min(plans, key=lambda plan: plan.cost, default=None)
+
+
+def _plans(
+    task: FocusingTask, tolerance: float, curvature: GroupCurvature, source: tuple[Interpolator, int] | None
+) -> Iterator[LinePlan]:
+    """Plans for one side of tiles and number of pulses per group, whose predicted errors are at most `tolerance`."""
+    side, group, n_samples, n_pixels = curvature.side, curvature.group, task.raw.n_samples, task.grid.size
+    order, fixed = series(tolerance, curvature, task.highest)
+    fixed += error_bounds.phase_rounding(0.0, task.highest, True) * 2
+    fixed += error_bounds.position_rounding(curvature.radius, task.bandwidth, False)
+    fixed += error_bounds.curvature_rounding(curvature.radius, curvature.distance, task.highest)
+    if not fixed <= MOST_FIXED * tolerance:
+        return
+    fixed += curvature.phase_error + error_bounds.sum_rounding(group, n_samples)
+    shift, cells = curvature.shift(task.bandwidth), curvature.cells(task.bandwidth)
+    for fine, taps, slope in itertools.product(FINES, interpolation.LINE_TERMS, (False, True)):
+        if cells * SAMPLING_MARGIN >= fine or _local_bytes(side, group, fine, taps, slope) > LOCAL_BYTES:
             continue
-        fixed += curvature.phase_error + error_bounds.sum_rounding(group, n_samples)
-        position_phase, cells = curvature.shift(bandwidth), curvature.cells(bandwidth)
-        for fine, taps, slope in itertools.product(FINES, interpolation.LINE_TERMS, (False, True)):
-            size = 4 * group * (fine * 2 * (2 * side + 16) + taps * (5 if slope else 3) * side)
-            if cells * 1.2 >= fine or size > LOCAL_BYTES:
+        line = interpolation.line_interpolator(taps, fine / cells)
+        shift_error = shift**2 / 2 + SLOPE_ERROR * shift * line.error if slope else shift
+        error = fixed + line.error + shift_error
+        if not error <= MOST_CHOSEN * tolerance:
+            continue
+        vectors = fine * (SAMPLED_SIDES * side + SAMPLED_ENDS)
+        cost = _cost(side, group, taps, slope, vectors)
+        if source is not None:
+            interpolator, length = source
+            if not interpolator.error <= tolerance - error:
                 continue
-            line = interpolation.line_interpolator(taps, fine / cells)
-            # the error of the weights' slopes is a few times that of the weights
-            shifted = position_phase**2 / 2 + 8 * position_phase * line.error if slope else position_phase
-            error = fixed + line.error + shifted
-            if not error <= MOST_CHOSEN * tolerance:
+        else:
+            reads = n_pixels * cost_model.LINE_SAMPLE * vectors / side**2
+            choice = profile_interpolator(tolerance - error, n_samples, reads)
+            if choice is None:
                 continue
-            vectors = fine * (1.3 * side + 8)
-            per_tile = cost_model.LINE_SAMPLE * vectors + cost_model.LINE_WEIGHTS * side + cost_model.LINE_PULSE
-            per_tap = taps * cost_model.LINE_TAP * (cost_model.LINE_SLOPE if slope else 1)
-            per_pair = per_tap + per_tile / side**2 + cost_model.LINE_GROUP / group
-            if source is None:
-                reads = grid.size * cost_model.LINE_SAMPLE * vectors / side**2
-                found = profile_interpolator(tolerance - error, n_samples, reads)
-                if found is None:
-                    continue
-                made, length, cost = found
-                per_pair += (cost - cost_model.TAPS[2]) * reads / grid.size
-            else:
-                made, length = source
-                if not made.error <= tolerance - error:
-                    continue
-            if best is None or per_pair < best.cost:
-                best = LinePlan(
-                    side, fine, group, line, made, length, order, slope,
-                    *curvature.limits(bandwidth, length / n_samples), error + made.error, per_pair,
-                )  # fmt: skip
-    return best
+            interpolator, length, profile_cost = choice
+            cost += (profile_cost - cost_model.TAPS[2]) * reads / n_pixels
+        limit_cycles, limit_position, limit_step = curvature.limits(task.bandwidth, length / n_samples)
+        yield LinePlan(
+            side=side,
+            fine=fine,
+            group=group,
+            line=line,
+            interpolator=interpolator,
+            length=length,
+            order=order,
+            slope=slope,
+            limit_cycles=limit_cycles,
+            limit_position=limit_position,
+            limit_step=limit_step,
+            predicted_error=error + interpolator.error,
+            cost=cost,
+        )
+
+
+def _local_bytes(side: int, group: int, fine: int, taps: int, slope: bool) -> int:
+    """Bytes of local memory of a group: two numbers per sample of its lines; places, weights and slopes of their
+    taps."""
+    return 4 * group * (fine * 2 * (2 * side + 16) + taps * (5 if slope else 3) * side)
+
+
+def _cost(side: int, group: int, taps: int, slope: bool, vectors: float) -> float:
+    """Cost per contribution where range profiles have two taps; vectors: samples of the profile of a line."""
+    per_tile = cost_model.LINE_SAMPLE * vectors + cost_model.LINE_WEIGHTS * side + cost_model.LINE_PULSE
+    per_tap = taps * cost_model.LINE_TAP * (cost_model.LINE_SLOPE if slope else 1)
+    return per_tap + per_tile / side**2 + cost_model.LINE_GROUP / group
+
+
+def series(tolerance: float, curvature: GroupCurvature, highest: float) -> tuple[int, float]:
+    """Order of the range series, and its phase error, rad; highest frequency, Hz."""
+    errors = {
+        order: error_bounds.series_error(curvature.radius, curvature.distance, highest, order) for order in (2, 3)
+    }
+    order = 2 if errors[2] < SERIES_SHARE * tolerance else 3
+    return order, errors[order]
+
+
+def profile_interpolator(error: float, n_samples: int, reads: float) -> tuple[Interpolator, int, float] | None:
+    """As interpolator_choice.choose_interpolator; None where none has so small an error: other lines may leave more to
+    the interpolator."""
+    try:
+        return interpolator_choice.choose_interpolator(error, n_samples, reads)
+    except ToleranceUnreachable:
+        return None

@@ -76,7 +76,7 @@ class FactorPlan:
     cost: float
     order: np.ndarray
 
-    def describe(self, method: str) -> dict[str, Any]:
+    def describe(self, method: str) -> dict[str, object]:
         """The plan in words and numbers, for a report."""
         return {
             "method": method,
@@ -127,7 +127,7 @@ class _Case:
     ) -> None:
         grid = task.grid
         self.task, self.track, self.order, self.tolerance, self.lines = task, track, order, tolerance, lines
-        self.highest, self.bandwidth = task.highest, float(task.raw.bandwidth.max())
+        self.highest, self.bandwidth = task.highest, task.bandwidth
         self.distance = task.antennas.distance(grid.bounds)
         tiling = tiling_of(grid, 16)
         self.axes, self.points, self.largest = tiling.axes, tiling.outline(), tiling.longest_side
@@ -245,14 +245,11 @@ class _Case:
         self, tolerance: float, kept: PulseGeometry, source: tuple[Interpolator, int], tiling: Tiling
     ) -> LinePlan | Plan | None:
         """Plan from leaves to pixels within a tolerance; None: there is none."""
-        raw, n_samples = self.task.raw, self.task.raw.n_samples
+        raw = self.task.raw
         if tolerance <= 0:
             return None
         if self.lines:
-            return line_plan.choose(
-                tolerance, self.task.grid, kept, n_samples=n_samples, bandwidth=self.bandwidth,
-                highest=self.highest, source=source, sides=(tiling.side,),
-            )  # fmt: skip
+            return line_plan.choose(self.task, kept, tolerance, source=source, sides=(tiling.side,))
         best = None
         for mode in (0, 1):
             for order in (2, 3, 0):
@@ -269,10 +266,7 @@ class _Case:
         """Direct plan, on the same leaves, for tiles only partly in a range window or beam; None: there is none."""
         raw = self.task.raw
         if self.lines:
-            return line_plan.choose(
-                self.tolerance, self.task.grid, self.task.antennas, n_samples=raw.n_samples, bandwidth=self.bandwidth,
-                highest=self.highest, sides=(tiling.side,),
-            )  # fmt: skip
+            return line_plan.choose(self.task, self.task.antennas, self.tolerance, sides=(tiling.side,))
         try:
             return cheapest(
                 self.tolerance, [(tiling.per_tile, tiling.radius)], distance=self.distance, frequency=self.highest,
