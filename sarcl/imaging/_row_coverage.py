@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from ..base import validation
 from ..base.constants import SPEED_OF_LIGHT
@@ -44,7 +45,7 @@ def may_vary(task: FocusingTask) -> bool:
     return bool((most - reference > half * (1 - SLACK)).any() or (reference - least > half * (1 - SLACK)).any())
 
 
-def room_for_gain(task: FocusingTask, dtype: Any) -> None:
+def room_for_gain(task: FocusingTask, dtype: DTypeLike) -> None:
     """MemoryError where the gain needs a value per pixel and there is no memory for them."""
     if may_vary(task):
         validation.room(
@@ -56,7 +57,7 @@ def room_for_gain(task: FocusingTask, dtype: Any) -> None:
 Gains = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
-def seen_by(task: FocusingTask, dtype: Any, tapered: Gains | None = None) -> dict[str, Any]:
+def seen_by(task: FocusingTask, dtype: DTypeLike, tapered: Gains | None = None) -> dict[str, Any]:
     """Fields `gain` and `aperture` of an Image.
 
     The gain is a number where it is the same in all pixels, else an array of the grid's shape. The aperture is None
@@ -101,7 +102,7 @@ def _aperture(task: FocusingTask) -> np.ndarray:
     return np.column_stack([raw.tx[rows], raw.rx[rows], beam, *limits])
 
 
-def _kind(dtype: Any) -> np.dtype:
+def _kind(dtype: DTypeLike) -> np.dtype:
     return np.dtype(np.float64 if np.dtype(dtype) == np.complex128 else np.float32)
 
 

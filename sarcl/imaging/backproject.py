@@ -268,7 +268,9 @@ def _piece(options: BackprojectOptions) -> tuple[int, int] | None:
     return i, n
 
 
-def _antenna_gain(task: FocusingTask, chosen: MethodChoice, device: Device, options: BackprojectOptions) -> Any:
+def _antenna_gain(
+    task: FocusingTask, chosen: MethodChoice, device: Device, options: BackprojectOptions
+) -> float | np.ndarray | None:
     """Sums of the squared gains of the antenna times the weights, float32 of the grid's shape; a number where they are
     the same in all pixels; None where they are 0 in all: the antenna sees no pixel inside a range window."""
     engine: Any = chosen.engine
@@ -285,7 +287,7 @@ def _antenna_gain(task: FocusingTask, chosen: MethodChoice, device: Device, opti
     return float(flat.flat[0]) if flat.min() == flat.max() > 0 else flat.reshape(task.grid.shape)
 
 
-def _measure_error(task: FocusingTask, grid: ImageGrid, data: Any) -> float:
+def _measure_error(task: FocusingTask, grid: ImageGrid, data: Any) -> float:  # data: an array, or a dataset of a file
     """Relative error at up to 256 random pixels against the exact float64 sum, as `tolerance` is defined."""
     from ..reference.backproject import backproject as exact
 

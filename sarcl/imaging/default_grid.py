@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..base import wgs84
 from ..base.constants import SPEED_OF_LIGHT
@@ -36,13 +38,13 @@ class DefaultGrid:
 def default_grid(
     raw: PhaseHistory,
     *,
-    center: Any = None,
-    shape: Any = None,
-    spacing: Any = None,
-    normal: Any = None,
-    x_axis: Any = None,
-    side: Any = None,
-    heights: Any = 0.0,
+    center: ArrayLike | None = None,
+    shape: int | Sequence[int] | None = None,
+    spacing: float | Sequence[float] | None = None,
+    normal: ArrayLike | None = None,
+    x_axis: ArrayLike | None = None,
+    side: str | None = None,
+    heights: float | ElevationModel = 0.0,
 ) -> DefaultGrid:
     """A plane (horizontal by default) for a phase history; arguments that are None are chosen from the data.
 
@@ -109,7 +111,7 @@ def _spread(raw: PhaseHistory, x: np.ndarray) -> float:
     return float(np.sqrt(np.mean(_excess(raw, x)[0] ** 2)))
 
 
-def _center_on_earth(raw: PhaseHistory, side: Any, heights: Any) -> tuple[np.ndarray, str]:
+def _center_on_earth(raw: PhaseHistory, side: str | None, heights: float | ElevationModel) -> tuple[np.ndarray, str]:
     """The point at `heights` whose ranges to the antennas are the reference ranges, by least squares; and words."""
     if side is None:
         raise ValueError(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -16,7 +16,10 @@ from ..numerics.interpolation import Interpolator
 from ..opencl.device import Device
 from ..opencl.pipeline import Pipeline
 from .focusing_task import FocusingTask
-from .tiling.tiling import Run, Tiling
+from .tiling.tiling import FlatImage, Run, Tiling
+
+if TYPE_CHECKING:
+    from ..opencl.device import Buffer
 
 UPLOAD = 2**26  # bytes of samples of a block on a GPU: while it computes with these, the host uploads as many
 
@@ -59,7 +62,7 @@ class ImagePlan(Protocol):
         """Samples of a range profile."""
         ...
 
-    def describe(self, method: str) -> dict[str, Any]:
+    def describe(self, method: str) -> dict[str, object]:
         """The plan in words and numbers, for a report."""
         ...
 
@@ -98,7 +101,7 @@ class Engine(ABC):
 
     @abstractmethod
     def fill(
-        self, first: int, last: int, flat: Any, budget: float, clock: Clock, on_progress: Callable[[float], None]
+        self, first: int, last: int, flat: FlatImage, budget: float, clock: Clock, on_progress: Callable[[float], None]
     ) -> Skipped:
         """Write the pixels of bands first ... last - 1 to their places in `flat` (ImageOutput.flat).
 
@@ -181,7 +184,7 @@ class RowProfiles:
         sample_bytes = self.task.raw.samples.dtype.itemsize * self.task.raw.n_samples
         return max(1, min(on_others, UPLOAD // sample_bytes))
 
-    def upload(self, start: int, stop: int) -> Any:
+    def upload(self, start: int, stop: int) -> Buffer:
         """Buffer of the profiles (stop - start, stride) of rows start ... stop - 1."""
         along = self.task.row_weight[start:stop]
         samples = self.task.raw.read(start, stop)

@@ -10,13 +10,16 @@ Kernels: kernels/pixel_weights.clh.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..opencl.device import Device
 from ._row_coverage import RowCoverage
 from .focusing_task import FocusingTask
+
+if TYPE_CHECKING:
+    from ..opencl.device import Buffer
 
 CELLS = 2**14  # of a table in float32
 PIECE = 2**20  # pairs of a pixel and a row whose weights are added up together
@@ -102,13 +105,13 @@ class TaperOnDevice:
         """Bytes on the device per pixel."""
         return 0 if self.table is None else 2 * np.dtype(self.kind).itemsize
 
-    def apertures(self, positions: np.ndarray) -> Any:
+    def apertures(self, positions: np.ndarray) -> Buffer | None:
         """Buffer of start and inverse (2, pixels) of positions, m (n_tiles, per_tile, 3); None without a taper."""
         if self.table is None:
             return None
         return self.device.upload(PixelTaper(self.task).apertures(positions).astype(self.kind))
 
-    def arguments(self, apertures: Any, start: int, stop: int) -> tuple[Any, ...]:
+    def arguments(self, apertures: Buffer | None, start: int, stop: int) -> tuple[Buffer | None, ...]:
         """The kernel's arguments of rows start ... stop - 1: place, taper, aperture; none without a taper."""
         if self.table is None or self.task.places is None:
             return ()

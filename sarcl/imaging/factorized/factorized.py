@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,11 +23,14 @@ from ..direct.direct import Direct
 from ..direct.tile_kernels import TilesOnDevice, kernel_of
 from ..engine import Engine, RowProfiles, Skipped
 from ..focusing_task import FocusingTask
-from ..tiling.tiling import Roots, Tiling
+from ..tiling.tiling import FlatImage, Roots, Tiling
 from ..tiling.tree import Tree
 from ._memory import MemoryPlan
 from ._tile_coverage import TileCoverage, coverage_of, same_coverage, without
 from .plan import GUARD, FactorPlan, Level, moving_cost
+
+if TYPE_CHECKING:
+    from ...opencl.device import Buffer
 
 MERGE = "merge_subapertures.cl"
 SPAN = 32  # vectors of a profile per work-item on CPUs; 1 on GPUs, where neighbouring work-items then read one line
@@ -38,9 +41,9 @@ class _Descent:
     """A tree of tiles on the device: sums of pixels, and for each level the centres of the tiles and their parents."""
 
     tree: Tree
-    image: Any
-    centers: list[Any]
-    parents: list[Any]
+    image: Buffer
+    centers: list[Buffer]
+    parents: list[Buffer | None]
     ready: TilesOnDevice
 
 
@@ -123,7 +126,7 @@ class Factorized(Engine):
         return min(self.memory.working(nbytes), nbytes)
 
     def fill(
-        self, first: int, last: int, flat: Any, budget: float, clock: Clock, on_progress: Callable[[float], None]
+        self, first: int, last: int, flat: FlatImage, budget: float, clock: Clock, on_progress: Callable[[float], None]
     ) -> Skipped:
         """Focus bands first ... last - 1 into `flat`; see engine.Engine."""
         tiling, n_rows = self.tiling, self.task.raw.n_rows
@@ -147,7 +150,7 @@ class Factorized(Engine):
 
     def _sums(
         self, tree: Tree, coverage: TileCoverage, budget: float, clock: Clock, on_progress: Callable[[float], None]
-    ) -> tuple[Any, np.ndarray]:
+    ) -> tuple[Buffer, np.ndarray]:
         """Sums of the leaves' pixels (4, pixels), on the device, and rows left out of each (2, n leaves)."""
         device, leaves, n_rows = self.device, tree.leaves, self.task.raw.n_rows
         image = device.zeros(16 * leaves.n_tiles * self.tiling.per_tile)
@@ -216,7 +219,7 @@ class Factorized(Engine):
         return picked, missed
 
     def _gather(
-        self, down: _Descent, low: int, high: int, left_out: list[np.ndarray | None], out: Any, budget: float,
+        self, down: _Descent, low: int, high: int, left_out: list[np.ndarray | None], out: Buffer, budget: float,
         clock: Clock, on_progress: Callable[[float], None],
     ) -> None:  # fmt: skip
         """First level: add the profiles of all pulses to the kept pulses of roots low ... high - 1.
@@ -275,7 +278,9 @@ class Factorized(Engine):
     def _spans(self, level: int) -> int:
         return -(-2 * self.strides[level] // (self._span * (8 if self.lanes > 1 else 2)))
 
-    def _descend(self, down: _Descent, level: int, low: int, high: int, source: Any, first: int, within: float) -> None:
+    def _descend(
+        self, down: _Descent, level: int, low: int, high: int, source: Buffer, first: int, within: float
+    ) -> None:
         """From the profiles of tiles low ... high - 1 of a level to their pixels, through all levels below.
 
         source, first  profiles of the level, of which the first is that of tile `first`

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from ...opencl.launch_numbers import launch_numbers
 from ..engine import DirectEngine, RowProfiles, Skipped
 from ..focusing_task import FocusingTask
 from ..pixel_taper import TaperOnDevice
-from ..tiling.tiling import Tiling, download_sums
+from ..tiling.tiling import FlatImage, Tiling, download_sums
 from ._pulse_records import packed
 from .plan import CHUNK, Float64Plan
 
@@ -61,7 +60,7 @@ class DirectFloat64(DirectEngine):
         )
 
     def fill(
-        self, first: int, last: int, flat: Any, budget: float, clock: Clock, on_progress: Callable[[float], None]
+        self, first: int, last: int, flat: FlatImage, budget: float, clock: Clock, on_progress: Callable[[float], None]
     ) -> Skipped:
         """Focus bands first ... last - 1 into `flat`; see engine.Engine."""
         raw, tiling, middle = self.task.raw, self.tiling, self.task.raw.n_rows // 2

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from ...opencl.device import Device
 from ...opencl.pipeline import Pipeline
 from ..focusing_task import FocusingTask
 from ._wavefront import Waves
+
+if TYPE_CHECKING:
+    from ...opencl.device import Buffer
 
 
 class WeightedRows:
@@ -29,13 +32,13 @@ class WeightedRows:
         self.held, self.row_bytes, self.largest = True, 0.0, 0.0
         self._energies = np.zeros(task.raw.n_rows)  # of rows that the host has weighed
         self._weigher: WeightedSamples | None = None
-        self._out: Any = None
+        self._out: Buffer | None = None
         self._rows = 0
         if fft.on_device(device, task.raw.n_samples, np.complex64):
             self._weigher = WeightedSamples(device, task.sample_weight, task.raw.n_rows, task.raw.samples.dtype)
             self.row_bytes = self._weigher.row_bytes
 
-    def buffer(self, pipeline: Pipeline, start: int, stop: int) -> Any:
+    def buffer(self, pipeline: Pipeline, start: int, stop: int) -> Buffer:
         """Rows start ... stop - 1 in a buffer, which may be the one of the call before."""
         if self._weigher is None:
             return self.device.upload(self._on_host(start, stop))
@@ -52,6 +55,7 @@ class WeightedRows:
         else:
             self.held = False
             self.device.write(self._out, self._on_host(start, stop))
+        assert self._out is not None
         return self._out
 
     def energy(self) -> float:

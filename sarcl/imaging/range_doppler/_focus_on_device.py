@@ -8,7 +8,7 @@ down in blocks.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -28,6 +28,9 @@ from ._doppler import EVANESCENT
 from ._host_rows import ARRAYS, Budget, referenced, turns
 from ._plan import SEGMENT, FocusPlan
 from ._track import Track
+
+if TYPE_CHECKING:
+    from ...opencl.device import Buffer
 
 LENGTHS = 3  # of FFTs: along the track, of range profiles, back; the programs of each keep what they take
 WORK = 1 / 16  # share of a budget for the rows that are transformed at a time, with one of these lengths
@@ -128,8 +131,8 @@ class Room:
 class _Array:
     """An array complex64 on the device, in `buffer`, or in `host`: in memory or a file."""
 
-    buffer: Any = None
-    host: Any = None
+    buffer: Buffer
+    host: np.ndarray
 
     def __init__(self, device: Device, shape: tuple[int, int], resident: bool) -> None:
         self.device, self.shape, self.resident = device, shape, resident
@@ -234,7 +237,7 @@ class _Migration:
         at_once, period = min(self.room.bins, len(plan.bins)), folded.shape[0]
         self._batches.reserve(at_once)
         free = [device.empty(8 * at_once * self._stride) for _ in bins.near(0)]
-        made: dict[int, Any] = {}  # profiles of the nodes about a block
+        made: dict[int, Buffer] = {}  # profiles of the nodes about a block
         chosen = spectra.buffer if spectra.resident else device.empty(8 * at_once * spectra.shape[1])
         out = folded.buffer if folded.resident else device.empty(8 * at_once * folded.shape[1])
         with Pipeline(device) as pipeline:
@@ -267,7 +270,7 @@ class _Migration:
                     folded.host[numbers % period] += device.download(out, part)
 
     def _profiles(
-        self, pipeline: Pipeline, given: tuple[Any, int, int], doppler: np.ndarray, distance: float, out: Any
+        self, pipeline: Pipeline, given: tuple[Buffer, int, int], doppler: np.ndarray, distance: float, out: Buffer
     ) -> None:  # fmt: skip
         """Range profiles after the secondary range compression of one slant range, m, of spectra that are `given`."""
         device, bins, n = self.device, self.bins, len(doppler)
@@ -290,8 +293,8 @@ class _Migration:
             device.run(self._pad, (self._stride, count), None, work, length, bins.pad, start, out)
 
     def _add(
-        self, pipeline: Pipeline, profiles: list[Any], doppler: np.ndarray, block: tuple[int, int],
-        to: tuple[Any, int, int], anew: bool,
+        self, pipeline: Pipeline, profiles: list[Buffer], doppler: np.ndarray, block: tuple[int, int],
+        to: tuple[Buffer, int, int], anew: bool,
     ) -> None:  # fmt: skip
         """Add profiles, read along the migration and turned, in the columns of a block: each with its shares.
 

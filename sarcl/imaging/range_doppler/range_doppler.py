@@ -104,7 +104,7 @@ class RangeDopplerPlan:
                 self.options.progress("range Doppler", round(1000 * share), 1000)
 
         data = focus(task.device, plan, raw, task.track, weight, task.budget, clock, on_progress)
-        gain = float(task.sample_weight.sum() * task.row_weight.sum())
+        gain: float | np.ndarray = float(task.sample_weight.sum() * task.row_weight.sum())
         if task.extent.has_beam:
             gain = gain_of(plan, task.track, *weight, task.tolerance)
             if isinstance(gain, np.ndarray):

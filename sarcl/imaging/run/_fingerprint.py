@@ -6,6 +6,7 @@ import json
 from typing import Any
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from ...base.fingerprint import as_bytes, checker, checksum, kernels, leaves
 from ..engine import ImagePlan
@@ -14,7 +15,7 @@ from ..tiling.tiling import Tiling
 
 
 def job(
-    task: FocusingTask, method: str, tolerance: float, plan: ImagePlan, tiling: Tiling, dtype: Any
+    task: FocusingTask, method: str, tolerance: float, plan: ImagePlan, tiling: Tiling, dtype: DTypeLike
 ) -> dict[str, Any]:
     """Everything that the pixels depend on, as text and numbers; arrays, and the samples, as checksums.
 

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass
-from typing import Any
 
 from ...base.stage_timer import Clock
 from ...opencl.failures import DeviceFailed
 from ..choose_method import MethodChoice
 from ..engine import Skipped
 from ..focusing_task import FocusingTask
-from ..tiling.tiling import Run
+from ..tiling.tiling import FlatImage, Run
 from .checkpoint import Checkpoint
 from .image_output import BandBuffer, ImageOutput
 from .tile_files import gaps
@@ -55,7 +54,7 @@ class BandFiller:
                 self.progress("backproject", done, total)
                 reported = done
 
-        def output_for(first: int, last: int) -> Any:
+        def output_for(first: int, last: int) -> FlatImage:
             return BandBuffer(tiling, first, last, self.chosen.dtype) if output is None else output.flat
 
         most = float("inf")

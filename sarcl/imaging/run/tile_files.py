@@ -20,8 +20,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from ...base.fingerprint import as_bytes, checker
+from ...base.types import PathLike
 from ...io import output_paths
 from ..engine import Skipped
 from ..tiling.tiling import Run, Tiling
@@ -34,7 +36,7 @@ NAME = re.compile(r"bands-(\d+)-(\d+)\.tiles")
 DIGEST = 32  # bytes
 
 
-def folder_of(path: Any) -> Path:
+def folder_of(path: PathLike) -> Path:
     """The folder for the tile files of image `path`."""
     return Path(f"{output_paths.place(path)}.parts")
 
@@ -45,7 +47,7 @@ class TileStore:
     ValueError where the folder belongs to another job, OSError where it cannot be created.
     """
 
-    def __init__(self, folder: Path, job: dict[str, Any], tiling: Tiling, dtype: Any) -> None:
+    def __init__(self, folder: Path, job: dict[str, Any], tiling: Tiling, dtype: DTypeLike) -> None:
         self.folder, self.tiling, self.dtype = folder, tiling, np.dtype(dtype)
         self.mark = mark(job)
         try:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -13,8 +13,11 @@ from ...base.morton import morton_order
 from ...model.image_grid import ImageGrid
 from ...numerics.tiles import Tiles, tile_points
 from ...opencl.device import Device
-from .tiling import Orders, Part, Roots, Run, Section, Tiling
+from .tiling import FlatImage, Orders, Part, Roots, Run, Section, Tiling
 from .tree import Tree
+
+if TYPE_CHECKING:
+    from ...opencl.device import Buffer
 
 KEPT = 2**25  # points of a grid whose order is kept, in 4 bytes each
 
@@ -104,7 +107,7 @@ class PointTiling(Tiling):
         parts = [self._points(b)[order] for b, order in zip(range(first, last), orders, strict=True)]
         return np.concatenate(parts).reshape(-1, self.per_tile, 3)
 
-    def place(self, values: np.ndarray, run: Run, start: int, orders: Orders, flat: Any) -> None:
+    def place(self, values: np.ndarray, run: Run, start: int, orders: Orders, flat: FlatImage) -> None:
         skipped, taken = start * self.per_tile, 0  # values before those given, and those placed
         for band, order in zip(range(*run), orders, strict=True):
             assert order is not None
@@ -158,7 +161,7 @@ class PointTiling(Tiling):
                 below = tree.part(part.low, part.high)
                 yield Section(part, below, roots, np.arange(part.low, part.high), sizes[below.slot], orders)
 
-    def place_section(self, device: Device, sums: Any, section: Section, flat: Any) -> None:
+    def place_section(self, device: Device, sums: Buffer, section: Section, flat: FlatImage) -> None:
         slot = section.tree.slot
         self.place_sums(device, sums, section.part[:2], (slot[0], slot[-1] + 1), section.orders, flat)
 

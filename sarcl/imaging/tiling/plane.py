@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,8 +13,11 @@ from ...model.image_grid import ImageGrid
 from ...numerics.tiles import Tiles
 from ...opencl.device import Device
 from ...opencl.launch_numbers import launch_numbers
-from .tiling import Orders, Part, Roots, Run, Section, Tiling
+from .tiling import FlatImage, Orders, Part, Roots, Run, Section, Tiling
 from .tree import Tree
+
+if TYPE_CHECKING:
+    from ...opencl.device import Buffer
 
 
 def _power_of_two(n: int) -> int:
@@ -84,7 +87,7 @@ class PlaneTiling(Tiling):
         made = self.grid.at(i[:, None], j).reshape(last - first, self.high, self.across, self.wide, 3)
         return made.transpose(0, 2, 1, 3, 4).reshape(-1, self.per_tile, 3)
 
-    def place(self, values: np.ndarray, run: Run, start: int, orders: Orders, flat: Any) -> None:
+    def place(self, values: np.ndarray, run: Run, start: int, orders: Orders, flat: FlatImage) -> None:
         n_bands, columns, rows = run[1] - run[0], self.grid.shape[1], self.extent(*run)
         across = len(values) // self.per_tile // n_bands
         left, right = start * self.wide, min((start + across) * self.wide, columns)
@@ -93,14 +96,16 @@ class PlaneTiling(Tiling):
         flat[rows, left:right] = block[: rows.stop - rows.start, : right - left]
 
     def place_sums(
-        self, device: Device, sums: Any, run: Run, tiles: tuple[int, int], orders: Orders, flat: Any
+        self, device: Device, sums: Buffer, run: Run, tiles: tuple[int, int], orders: Orders, flat: FlatImage
     ) -> None:
         if tiles == (0, (run[1] - run[0]) * self.across):
             self._write(device, sums, run, None, flat)
         else:
             super().place_sums(device, sums, run, tiles, orders, flat)
 
-    def _write(self, device: Device, sums: Any, run: Run, slot: np.ndarray | None, flat: Any, left: int = 0) -> None:
+    def _write(
+        self, device: Device, sums: Buffer, run: Run, slot: np.ndarray | None, flat: FlatImage, left: int = 0
+    ) -> None:
         """Write the rows of a run of bands to the flat image, from compensated sums (4, pixels) on the device.
 
         slot  (tiles,) int: number of each of the sums' tiles among the bands', row by row; None: in that order
@@ -203,7 +208,7 @@ class PlaneTiling(Tiling):
         some.grid = self.grid.columns(part.low * self.wide, min(part.high * self.wide, self.grid.shape[1]))
         return some
 
-    def place_section(self, device: Device, sums: Any, section: Section, flat: Any) -> None:
+    def place_section(self, device: Device, sums: Buffer, section: Section, flat: FlatImage) -> None:
         part = section.part
         self._columns(part)._write(device, sums, part[:2], section.tree.slot, flat, part.low * self.wide)
 
