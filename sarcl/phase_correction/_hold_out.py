@@ -16,9 +16,9 @@ import numpy as np
 
 from ..base.validation import sealed
 from . import _bright_points, _displacement, _phase_gradient, _phase_smoothing, _smooth_search
-from ._aperture_view import NO_LAG, WINDOW, ApertureView, Errors
+from ._aperture_view import NO_LAG, ApertureView, Errors
 from ._constant_echo import without_constant_echo
-from ._search import GROWTH
+from ._echo_parts import near_and_far, phase_of
 
 log = logging.getLogger(__name__)
 
@@ -32,7 +32,6 @@ APART = 0.5  # resolution cells: what moves bright places against one another by
 SURE = 0.98  # agreement of the halves of the band from which on it is; 0.95 to 0.98 has been wrong by 1.4 cells
 COMMON = 0.35  # share of their pulses that neighbouring bright places must have in common for it
 SPANS = 16  # of the aperture: a slope of the phase over one of them moves points, one over a few pulses blurs them
-PASSES = 3  # of the estimate from given places
 IN_FOCUS = (
     "no phase sharpens echoes that it was not found from: the data are as well focused as these echoes can show; if "
     "the image is blurred, give a grid over its brightest isolated points"
@@ -58,9 +57,6 @@ MOVED_APART = (
 UNSURE = "the halves of the band agree to {:.2f} only, where {} is wanted"
 UNLINKED = "of the pulses that see one of them too few see the next: {:.0%}, where {:.0%} is wanted"
 CLOSER = 1.05  # preference for the phase from all echoes, which is the most exact, unless its smoothing went wrong
-# of the power of the brightest place: side lobes in range, of a Hamming window over the band, are below (-43 dB)
-SIDE_LOBES = 1e-4
-BETWEEN = 2.0  # range cells of half the band behind the border of near and far places, which neither uses
 
 
 def cross_validated(view: ApertureView, errors: Errors, tick: Callable[[], None]) -> tuple[Errors, dict[str, Any]]:
@@ -78,24 +74,24 @@ def cross_validated(view: ApertureView, errors: Errors, tick: Callable[[], None]
     if shift.any():
         plain = [part.contributions((zero, zero), places, NO_LAG, taper=True)[:, :, 0] for part in parts]
     tick()
-    sets = [np.tile(s, view.channels) for s in _near_and_far(parts[0], places, values, errors[0])]
+    sets = [np.tile(s, view.channels) for s in near_and_far(parts[0], places, values, errors[0])]
 
     def closeness(a: np.ndarray, b: np.ndarray) -> float:
         return _phase_smoothing.alignment(a, b, view.shift_phase, view.cell / 2)[1]
 
     least = max(AGREE, _phase_smoothing.chance(n))
-    bands = [_phase(view, v) for v in values]
+    bands = [phase_of(view, v) for v in values]
     moved, agreement = _phase_smoothing.alignment(bands[0], bands[1], view.shift_phase, view.cell / 2)
     difference = np.exp(1j * (moved - bands[1]))
     # (phase, columns it must sharpen, the same without any correction, phase of these columns)
     tests = [(bands[1 - h], values[h], plain[h], bands[h]) for h in (0, 1)]
     sides = []
     for some in sets:
-        own = [_phase(view, v.compress(some, axis=1)) for v in values] if some.sum() > 1 else []
+        own = [phase_of(view, v.compress(some, axis=1)) for v in values] if some.sum() > 1 else []
         known = closeness(*own) if own else 0.0
         both = np.concatenate([v.compress(some, axis=1) for v in values], axis=1)
         old = np.concatenate([v.compress(some, axis=1) for v in plain], axis=1)
-        sides.append((known, _phase(view, both) if known > least else zero, both, old))
+        sides.append((known, phase_of(view, both) if known > least else zero, both, old))
         log.debug("%d places give phases that agree to %.2f between halves of the band", some.sum(), known)
     if all(side[0] > least for side in sides):
         tests += [(sides[1 - i][1], sides[i][2], sides[i][3], sides[i][1]) for i in (0, 1)]
@@ -241,69 +237,9 @@ def _none_lost(view: ApertureView, errors: Errors, power: np.ndarray) -> bool:
     span = max(1, view.n // SPANS)
     slope = np.percentile(np.abs(errors[0][span:] - errors[0][:-span]), 90) / span
     for place, level in zip(*_displacement.bright_places(view, view.power((zero, zero))), strict=True):
-        per_metre = np.ptp(_displacement.shift_phase(view, place, np.ones(view.n))) / view.n
+        per_metre = np.ptp(_displacement.shiftphase_of(view, place, np.ones(view.n))) / view.n
         near = np.linalg.norm(new - place, axis=1) <= 2 * view.cell + slope / max(per_metre, 1e-300)
         if now[near].max(initial=0.0) < LOST * level:
             log.debug("the point at %s, bright before, is lost", place)
             return False
     return True
-
-
-def _near_and_far(
-    view: ApertureView, places: np.ndarray, values: list[np.ndarray], phase: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Two sets of places, bool (k,) each, at different ranges, of sharpness as equal as can be.
-
-    Places between the sets belong to neither. Where they are all the targets that one of them has, the sets are those
-    of which the fainter is as sharp as can be; where these lack a target too, both are empty.
-    """
-    middle = view.n // 2 * view.channels
-    cells = _bright_points.delay(view.raw, middle, places) * view.raw.bandwidth[0]
-    level = np.maximum(*(sum(abs(_phase_gradient.turned(v, e).sum(axis=0)) ** 4 for v in values)
-                         for e in (phase, 0 * phase)))  # fmt: skip
-    level = level.reshape(view.channels, -1).sum(axis=0)
-    order = np.argsort(cells)
-    ranges, total = cells[order], np.concatenate([[0.0], np.cumsum(level[order], dtype=np.float64)])
-    beyond = np.searchsorted(ranges, ranges + BETWEEN, side="right")
-    bright = level >= SIDE_LOBES**2 * level.max()
-    for first in (np.arange(1, len(order) + 1), beyond):  # of the places behind each border, in order of range
-        border = ranges[int(np.minimum(total[1:], total[-1] - total[first]).argmax())]
-        sets = cells <= border, cells > border + BETWEEN
-        if all((some & bright).any() for some in sets):
-            return sets
-    return np.zeros(len(cells), bool), np.zeros(len(cells), bool)
-
-
-def _phase(view: ApertureView, v: np.ndarray) -> np.ndarray:
-    """The phase (n,), from a start without any, that sharpens the contributions v (n, k) to bright points most."""
-    if view.is_narrow:
-        return _narrow_phase(v)
-    first, last = view.narrow_pulses
-    phase = np.zeros(view.n)
-    brightest = np.argsort(-np.abs(v[first:last].sum(axis=0)))[: view.places]
-    phase[first:last] = _narrow_phase(v[first:last].take(brightest, axis=1))
-    while last - first < view.n:
-        step = (last - first) // GROWTH + 1
-        low, high = max(0, first - step), min(view.n, last + step)
-        start = _phase_gradient.extended(v[low:high], phase[low:high], first - low, last - low)
-        phase[low:high] = _phase_gradient.sharpen(v[low:high], start, 0)
-        first, last = low, high
-    still = _phase_gradient.sharpen(v, np.zeros(view.n), 0)
-    return max((phase, still), key=lambda start: _phase_gradient.sharpness(v, start, 0))
-
-
-def _narrow_phase(v: np.ndarray) -> np.ndarray:
-    """`_phase` over a narrow aperture."""
-    n = len(v)
-    phase = np.zeros(n)
-    for k in range(PASSES):
-        widths = [max(n / 2 ** (k + i / 2), _phase_gradient.NARROWEST) for i in range(8)]
-        width = max(n / 4**k, WINDOW)
-        left = _phase_gradient.turned(v, phase)
-        starts = [np.zeros(n), _phase_gradient.gradient(left, widths)]
-        levels = [_phase_gradient.sharpness(left, start, width) for start in starts]
-        step = _phase_gradient.sharpen(left, starts[int(np.argmax(levels))], width)
-        phase = phase + step
-        if width <= WINDOW and _phase_gradient.sharpness(left, step, width) < 1.002 * levels[0]:
-            break
-    return phase
