@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..base.constants import SPEED_OF_LIGHT
 from ..base.rows import groups
@@ -131,7 +130,7 @@ def phasor(cycles: np.ndarray) -> np.ndarray:
 
 
 def contributions(
-    raw: PhaseHistory, places: np.ndarray, lags: Any, scale: float, taper: bool = False, beam: Beam | None = None
+    raw: PhaseHistory, places: np.ndarray, lags: ArrayLike, scale: float, taper: bool = False, beam: Beam | None = None
 ) -> np.ndarray:
     """v_p(x)/scale at points x, m (n, 3), and at lags behind them in range: complex64 (n_rows, n, n_lags).
 
@@ -154,14 +153,14 @@ def contributions(
 
         def fill(first: int, start: int = start, stop: int = stop, profiles: np.ndarray = profiles) -> None:
             rows = np.arange(first, min(first + few, stop))
-            lit: Any = slice(None)
-            if beam is not None:
-                seen = _sees(raw.tx[rows], places, (beam[0], beam[1][rows]))
-                lit = np.flatnonzero(seen.any(axis=0))
-            read = _read(raw, rows, places[lit], lags, profiles[rows - start], length)
-            if beam is not None:
-                read *= seen[:, lit, None]
-            out[rows[0] : rows[-1] + 1, lit] = read
+            pulses = slice(rows[0], rows[-1] + 1)
+            if beam is None:
+                out[pulses] = _read(raw, rows, places, lags, profiles[rows - start], length)
+                return
+            is_seen = _sees(raw.tx[rows], places, (beam[0], beam[1][rows]))
+            lit = np.flatnonzero(is_seen.any(axis=0))
+            terms = _read(raw, rows, places[lit], lags, profiles[rows - start], length)
+            out[pulses, lit] = terms * is_seen[:, lit, None]
 
         of_each(fill, range(start, stop, few))
     return out

@@ -6,7 +6,7 @@ import numpy as np
 
 from . import _bright_points, _phase_gradient
 from ._aperture_view import WINDOW, ApertureView
-from ._search import GROWTH
+from ._search import ENOUGH, GROWTH
 
 PASSES = 3  # of the estimate from given places
 # of the power of the brightest place: side lobes in range, of a Hamming window over the band, are below (-43 dB)
@@ -24,8 +24,11 @@ def near_and_far(
     """
     middle = view.n // 2 * view.channels
     cells = _bright_points.delay(view.raw, middle, places) * view.raw.bandwidth[0]
-    level = np.maximum(*(sum(abs(_phase_gradient.turned(v, e).sum(axis=0)) ** 4 for v in values)
-                         for e in (phase, 0 * phase)))  # fmt: skip
+
+    def sharpness(removed: np.ndarray) -> np.ndarray:
+        return sum(abs(_phase_gradient.turned(v, removed).sum(axis=0)) ** 4 for v in values)
+
+    level = np.maximum(sharpness(phase), sharpness(0 * phase))
     level = level.reshape(view.channels, -1).sum(axis=0)
     order = np.argsort(cells)
     ranges, total = cells[order], np.concatenate([[0.0], np.cumsum(level[order], dtype=np.float64)])
@@ -34,7 +37,7 @@ def near_and_far(
     for first in (np.arange(1, len(order) + 1), beyond):  # of the places behind each border, in order of range
         border = ranges[int(np.minimum(total[1:], total[-1] - total[first]).argmax())]
         sets = cells <= border, cells > border + BETWEEN
-        if all((some & bright).any() for some in sets):
+        if all((picked & bright).any() for picked in sets):
             return sets
     return np.zeros(len(cells), bool), np.zeros(len(cells), bool)
 
@@ -64,11 +67,11 @@ def _narrow_phase(v: np.ndarray) -> np.ndarray:
     for k in range(PASSES):
         widths = [max(n / 2 ** (k + i / 2), _phase_gradient.NARROWEST) for i in range(8)]
         width = max(n / 4**k, WINDOW)
-        left = _phase_gradient.turned(v, phase)
-        starts = [np.zeros(n), _phase_gradient.gradient(left, widths)]
-        levels = [_phase_gradient.sharpness(left, start, width) for start in starts]
-        step = _phase_gradient.sharpen(left, starts[int(np.argmax(levels))], width)
+        blurred = _phase_gradient.turned(v, phase)
+        starts = [np.zeros(n), _phase_gradient.gradient(blurred, widths)]
+        levels = [_phase_gradient.sharpness(blurred, start, width) for start in starts]
+        step = _phase_gradient.sharpen(blurred, starts[int(np.argmax(levels))], width)
         phase = phase + step
-        if width <= WINDOW and _phase_gradient.sharpness(left, step, width) < 1.002 * levels[0]:
+        if width <= WINDOW and _phase_gradient.sharpness(blurred, step, width) < ENOUGH * levels[0]:
             break
     return phase
