@@ -81,15 +81,15 @@ def _axes(
                 f"{len(track)} rows, such as of pointing.stripmap"
             )
         aim = aim.attitude
-    given = converted("beam[1]", aim, np.float64)
-    if given.shape == (len(track), 3, 3):
-        return antenna.axes(replace(track, attitude=given))
-    if given.shape not in ((3,), (len(track), 3)):
+    attitude = converted("beam[1]", aim, np.float64)
+    if attitude.shape == (len(track), 3, 3):
+        return antenna.axes(replace(track, attitude=attitude))
+    if attitude.shape not in ((3,), (len(track), 3)):
         raise ValueError(
-            f"beam[1] has shape {given.shape}; with an Antenna give the direction of its boresight, (3,) or "
+            f"beam[1] has shape {attitude.shape}; with an Antenna give the direction of its boresight, (3,) or "
             f"({len(track)}, 3), its attitude, ({len(track)}, 3, 3), or a Trajectory with an attitude per row"
         )
-    return antenna.axes(pointing.fixed(track, given, up=up))
+    return antenna.axes(pointing.fixed(track, attitude, up=up))
 
 
 def rounding(task: FocusingTask, radius: float) -> float:
@@ -120,8 +120,8 @@ def shares(task: FocusingTask, points: np.ndarray) -> np.ndarray:
     """Weights conj(g), complex (n, n_rows), of points, m (n, 3), in all rows."""
     beam = task.antenna
     assert beam is not None
-    made = [beam.weights(points, row, beam.frequency).conj() for row in range(task.raw.n_rows)]
-    return np.stack(made, axis=1)
+    gains = [beam.weights(points, row, beam.frequency).conj() for row in range(task.raw.n_rows)]
+    return np.stack(gains, axis=1)
 
 
 class AntennaOnDevice:

@@ -82,9 +82,9 @@ def default_grid(
         spacing = tuple(float(f"{d:.4g}") for d in cell / 2)
         why.append(f"pixels half the resolution of {cell[0]:.3g} x {cell[1]:.3g} m")
     if shape is None:
-        wanted = [max(1, 2 * round(swath / (2 * d))) for d in np.broadcast_to(spacing, 2)]
-        shape = [min(n, MOST) for n in wanted]
-        limit = "" if shape == wanted else f"{MOST} pixels at most of "
+        unambiguous = [max(1, 2 * round(swath / (2 * d))) for d in np.broadcast_to(spacing, 2)]
+        shape = [min(n, MOST) for n in unambiguous]
+        limit = "" if shape == unambiguous else f"{MOST} pixels at most of "
         why.append(f"{limit}the {swath:.4g} m that are unambiguous")
     return DefaultGrid(ImageGrid.plane(shape=shape, spacing=spacing, **axes), "; ".join(why))
 
@@ -145,10 +145,7 @@ def _center(raw: PhaseHistory) -> tuple[np.ndarray, str]:
         x = _meet(raw, free)
         if x is not None and _spread(raw, x) <= float(raw.swath.min()) / 4:
             return np.round(x, 3), f"centre: {words}, to {_spread(raw, x):.2g} m"
-    return (
-        origin,
-        "centre: the origin, because the reference ranges meet in no point (--center names another)",
-    )
+    return (origin, "centre: the origin, because the reference ranges meet in no point (--center names another)")
 
 
 def _meet(raw: PhaseHistory, free: int) -> np.ndarray | None:

@@ -146,9 +146,14 @@ class RowProfiles:
     """
 
     def __init__(
-        self, device: Device, task: FocusingTask, interpolator: Interpolator, length: int, pad: int | None = None,
+        self,
+        device: Device,
+        task: FocusingTask,
+        interpolator: Interpolator,
+        length: int,
+        pad: int | None = None,
         dtype: type[np.complexfloating] = np.complex64,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.device, self.task, self.length, self.dtype = device, task, length, dtype
         self.pad = range_profiles.padding(interpolator) if pad is None else pad
         self.stride = length + 2 * self.pad
@@ -189,11 +194,11 @@ class RowProfiles:
         along = self.task.row_weight[start:stop]
         samples = self.task.raw.read(start, stop)
         if self._maker and self._maker.holds(samples, along):
-            given = self.pipeline.upload(samples), samples.dtype, self.pipeline.upload(self._maker.weights(along))
-            return self._maker.make(*given, stop - start)
+            buffer, weights = self.pipeline.upload(samples), self.pipeline.upload(self._maker.weights(along))
+            return self._maker.make(buffer, samples.dtype, weights, stop - start)
         weights = along[:, None] * self.sample_weight
-        made = range_profiles.from_samples(self.device, samples, weights, self.length, self.pad, self.dtype)
-        return self.pipeline.upload(made)
+        profiles = range_profiles.from_samples(self.device, samples, weights, self.length, self.pad, self.dtype)
+        return self.pipeline.upload(profiles)
 
     @property
     def _row_bytes(self) -> float:

@@ -32,9 +32,7 @@ class FocusOptions(RunOptions):
     )
     weights: ArrayLike | None = option(None, "one per row (n_rows,), multiplied with window and raw.weight")
     out: PathLike | None = option(
-        None,
-        'None, or a path ending in ".h5": the image is written there when it is finished',
-        in_files=False,
+        None, 'None, or a path ending in ".h5": the image is written there when it is finished', in_files=False
     )
 
     def is_checked(self, pairs: float, seconds: float) -> bool:

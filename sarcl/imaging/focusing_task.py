@@ -166,18 +166,26 @@ def make_task(
     if "no data" not in skips:
         grid = grid.filled()
     return FocusingTask(
-        raw, grid, geometry_of(raw, wrap, toward, angle), sample_weight, row_weight, wrap, frozenset(skips), taper,
-        None if taper is None else places_of(raw), antenna,
-    )  # fmt: skip
+        raw=raw,
+        grid=grid,
+        antennas=geometry_of(raw, wrap, toward, angle),
+        sample_weight=sample_weight,
+        row_weight=row_weight,
+        wrap=wrap,
+        skips=frozenset(skips),
+        taper=taper,
+        places=None if taper is None else places_of(raw),
+        antenna=antenna,
+    )
 
 
 def _all_lit(antennas: PulseGeometry, grid: ImageGrid) -> bool:
     """Whether every row sees the whole sphere about the grid."""
     low, high = grid.bounds
     middle, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2 * (1 + 1e-9)
-    depth = antennas.beam_depth(middle) if antennas.wrap else np.minimum(
-        antennas.beam_depth(middle), antennas.depth(middle)
-    )  # fmt: skip
+    depth = antennas.beam_depth(middle)
+    if not antennas.wrap:
+        depth = np.minimum(depth, antennas.depth(middle))
     return bool((depth > radius).all())
 
 
@@ -189,12 +197,12 @@ def places_of(raw: PhaseHistory) -> np.ndarray:
     when = np.arange(raw.n_rows) if raw.time is None else np.argsort(np.argsort(raw.time, kind="stable"))
     group = groups(raw.n_rows, raw.tx_channel, raw.rx_channel, raw.polarization)
     longest = int(np.bincount(group).max())
-    made = np.zeros(raw.n_rows)
+    places = np.zeros(raw.n_rows)
     for g in np.unique(group):
         members = np.flatnonzero(group == g)
-        at = (np.arange(len(members)) + 0.5) / len(members) * longest - 0.5
-        made[members[np.argsort(when[members])]] = at if len(members) < longest else np.arange(longest)
-    return made
+        stretched = (np.arange(len(members)) + 0.5) / len(members) * longest - 0.5
+        places[members[np.argsort(when[members])]] = stretched if len(members) < longest else np.arange(longest)
+    return places
 
 
 def check_polarizations(
@@ -248,6 +256,15 @@ def geometry_of(
     """The geometry of every row; the carrier is the frequency of sample n_samples//2; beam as of `beam_of`."""
     half = UNLIMITED if wrap else SPEED_OF_LIGHT / (4 * raw.frequency_step)
     return PulseGeometry.sampled(
-        raw.tx, raw.rx, raw.reference_range, first=raw.frequency, step=raw.frequency_step, n_samples=raw.n_samples,
-        near=-half, far=half, wrap=wrap, beam=beam, beam_angle=beam_angle,
-    )  # fmt: skip
+        raw.tx,
+        raw.rx,
+        raw.reference_range,
+        first=raw.frequency,
+        step=raw.frequency_step,
+        n_samples=raw.n_samples,
+        near=-half,
+        far=half,
+        wrap=wrap,
+        beam=beam,
+        beam_angle=beam_angle,
+    )

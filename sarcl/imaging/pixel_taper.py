@@ -63,20 +63,20 @@ class PixelTaper:
         start, inverse = self.apertures(positions)
         alike = task.row_weight.min() == task.row_weight.max() and len(np.unique(task.places)) == len(task.places)
         plain = alike & (np.rint(1 / inverse) == count)
-        known = {0: 0.0}
+        sum_of_count = {0: 0.0}
         for n in np.unique(count[plain]).astype(int):
-            known[n] = float(self.read((np.arange(n) + 0.5) / max(n, 1)).sum() * task.row_weight[0])
-        numbers = np.array(sorted(known))
-        sums = np.array([known[n] for n in numbers])
-        made = sums[np.searchsorted(numbers, np.where(plain, count, 0).astype(int))]
+            sum_of_count[n] = float(self.read((np.arange(n) + 0.5) / max(n, 1)).sum() * task.row_weight[0])
+        numbers = np.array(sorted(sum_of_count))
+        sums = np.array([sum_of_count[n] for n in numbers])
+        gains = sums[np.searchsorted(numbers, np.where(plain, count, 0).astype(int))]
         others = np.argwhere(~plain)
         step, rows = max(1, PIECE // task.raw.n_rows), np.arange(task.raw.n_rows)
         for at in range(0, len(others), step):
             tile, pixel = others[at : at + step].T
             seen = RowCoverage(task).sees(positions[tile, pixel], rows).T
             u = (task.places - start[tile, pixel, None]) * inverse[tile, pixel, None]
-            made[tile, pixel] = (seen * self.read(u)) @ task.row_weight
-        return made
+            gains[tile, pixel] = (seen * self.read(u)) @ task.row_weight
+        return gains
 
     def read(self, u: np.ndarray) -> np.ndarray:
         """W at u, of any shape."""

@@ -24,7 +24,7 @@ from ..tiling.of_grid import tiling_of
 from ..tiling.tiling import FlatImage, Tiling
 from . import _shared_line_plan, line_plan
 from .line_plan import LinePlan
-from .tile_kernels import CHUNK, kernel_of
+from .tile_kernels import CHUNK, Block, KernelForm, Profiles, Pulses, kernel_of
 
 if TYPE_CHECKING:
     from ...opencl.device import Buffer
@@ -79,14 +79,16 @@ class Direct(DirectEngine):
         """gain  True: it makes sums of squared gains of the antenna and the rows' weights, instead of an image."""
         self.device, self.task, self.plan, self.tiling = device, task, plan, tiling
         self.lanes = device.info.vector_width
-        bistatic = not task.antennas.is_monostatic
-        beam = task.antennas.beam is not None
         self.taper = TaperOnDevice(device, task, np.float32)
         self.antenna = None if task.antenna is None else AntennaOnDevice(device, task, gain)
-        self.kernels = kernel_of(
-            device, plan, tiling, bistatic=bistatic, wrap=task.wrap, local=False, beam=beam,
+        form = KernelForm(
+            bistatic=not task.antennas.is_monostatic,
+            wrap=task.wrap,
+            local=False,
+            beam=task.antennas.beam is not None,
             weights=self.antenna.macros if self.antenna else self.taper.macros,
-        )  # fmt: skip
+        )
+        self.kernels = kernel_of(device, plan, tiling, form)
         self.profiles = RowProfiles(device, task, plan.interpolator, plan.length)
         # per row, making the range profile costs a tenth of adding it to this many pixels: on a CPU, on a GPU, and on a
         # GPU whose profiles the host makes. For GPUs they are inferred from 2e11 pixels/s: none was measured
@@ -128,9 +130,8 @@ class Direct(DirectEngine):
             def rows_done(rows: float, start: int = start, stop: int = stop) -> None:
                 on_progress((start * self.task.raw.n_rows + (stop - start) * rows) / tiles.n_tiles)
 
-            whole = stop - start == tiles.n_tiles
-            some = tiles if whole else tiles.picked(np.arange(start, stop))
-            image, missed = self.add_up(some, budget, clock, rows_done)
+            part = tiles if stop - start == tiles.n_tiles else tiles.picked(np.arange(start, stop))
+            image, missed = self.add_up(part, budget, clock, rows_done)
             tiling.place_sums(self.device, image, (first, last), (start, stop), orders, flat)
             skipped += Skipped.of_tiles(missed, tiling.tile_sizes(first, last)[start:stop])
         clock.lap("write")
@@ -155,18 +156,19 @@ class Direct(DirectEngine):
             for start in range(0, raw.n_rows, rows):
                 stop = min(start + rows, raw.n_rows)
                 pipeline.new_block()
-                block = self.profiles.upload(start, stop)
+                profiles = Profiles(self.profiles.upload(start, stop), stride, stride // 2)
                 packed = self.task.antennas.packed(self.tiling.center, self.plan.length, start, stop, self.lanes)
-                pulses = pipeline.upload(packed), packed.shape[2], stop - start
+                pulses = Pulses(pipeline.upload(packed), packed.shape[2], stop - start)
                 weights = self.taper.arguments(apertures, start, stop)
                 if self.antenna:
                     weights = self.antenna.arguments(start, stop)
                 clock.lap("profiles")
                 at_once = int(for_constants / (4 * kernels.components * packed.shape[2] * pipeline.held))
                 step = max(1, min(tiles.n_tiles, at_once))
+                block = Block(pulses, profiles, weights, second)
                 for tile in range(0, tiles.n_tiles, step):
                     end = min(tile + step, tiles.n_tiles)
-                    kernels.add(on, tile, end, pulses, block, stride, stride // 2, 0, image, *weights, second=second)
+                    kernels.add(on, tile, end, block, image)
                     if end < tiles.n_tiles:  # the constants of these tiles are freed before many more are made
                         pipeline.step()
                 pipeline.step(partial(on_progress, stop))

@@ -86,10 +86,9 @@ def make_plan(task: FocusingTask, tolerance: float) -> tuple[Float64Plan, Tiling
     if good is None:
         ratio = 20 * np.log10(energy.near_pixels)
         dark = f": these pixels are {ratio:.0f} dB darker than their surroundings in the same rows"
-        raise ToleranceUnreachable(
-            tolerance, askable(rounded_up(min(p.predicted_error for p in plans))), "float64 range profiles",
-            how=f"in complex128{dark if energy.near_pixels > 10 else ''}",
-        )  # fmt: skip
+        best = askable(rounded_up(min(p.predicted_error for p in plans)))
+        how = f"in complex128{dark if energy.near_pixels > 10 else ''}"
+        raise ToleranceUnreachable(tolerance, best, "float64 range profiles", how=how)
     cheaper = [p for p in plans if p.cost < good.cost]
     other = min(cheaper, key=lambda p: p.predicted_error, default=None)
     named = Float64Plan(

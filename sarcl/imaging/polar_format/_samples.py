@@ -71,13 +71,13 @@ class WeightedRows:
         """Samples of rows start ... stop - 1 times their weights, with phases relative to the centre: complex64."""
         task, rows = self.task, slice(start, stop)
         raw = task.raw
-        made = raw.read(start, stop) * np.outer(task.row_weight[rows], task.sample_weight).astype(np.float32)
+        samples = raw.read(start, stop) * np.outer(task.row_weight[rows], task.sample_weight).astype(np.float32)
         # where the reference is the centre, the shift is rounding alone
         shift = float(np.abs(self.waves.shift[rows]).max())
         if shift * 4 * np.pi * task.highest / SPEED_OF_LIGHT > 1e-3 * self.tolerance:
             first, step = (cycles[:, None] for cycles in self._cycles(rows))
-            made = made * np.exp(2j * np.pi * (first + step * np.arange(raw.n_samples)))
-        largest = float(np.abs(made).max(initial=0.0))
+            samples = samples * np.exp(2j * np.pi * (first + step * np.arange(raw.n_samples)))
+        largest = float(np.abs(samples).max(initial=0.0))
         self.largest = max(self.largest, largest)
         n_samples = raw.n_rows * raw.n_samples
         if largest > LARGEST[np.complex64] / n_samples:
@@ -85,6 +85,6 @@ class WeightedRows:
                 f"samples times weights reach {largest:.1e}; sums of {n_samples} in complex64 hold up to "
                 f"{LARGEST[np.complex64]:.0e}: scale the samples down"
             )
-        out = made.astype(np.complex64)
+        out = samples.astype(np.complex64)
         self._energies[rows] = (out.real.astype(np.float64) ** 2 + out.imag.astype(np.float64) ** 2).sum(axis=1)
         return out

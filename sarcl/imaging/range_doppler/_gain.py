@@ -44,7 +44,7 @@ def gain_of(
     before = np.minimum(position.astype(int), max(len(chosen) - 2, 0))
     after, share = np.minimum(before + 1, len(chosen) - 1), position - before
     for first in range(0, n_times, 256):  # in blocks: a large image is not held in float64
-        some = sums[first : first + 256]
-        out[first : first + 256] = some[:, before] * (1 - share) + some[:, after] * share
+        block = sums[first : first + 256]
+        out[first : first + 256] = block[:, before] * (1 - share) + block[:, after] * share
     out[out < faintest * largest] = 0
     return out

@@ -29,9 +29,8 @@ def job(
     step = max(1, 2**24 // (raw.n_samples * np.dtype(raw.samples.dtype).itemsize))
     for start in range(0, raw.n_rows, step):
         samples.update(as_bytes(raw.read(start, min(start + step, raw.n_rows))))
-    others = set(task.__dataclass_fields__) - {
-        "raw", "grid", "antennas", "sample_weight", "row_weight", "wrap", "skips",
-    }  # fmt: skip
+    described = {"raw", "grid", "antennas", "sample_weight", "row_weight", "wrap", "skips"}
+    others = set(task.__dataclass_fields__) - described
     return {
         "sarcl": f"{__version__}, kernels {kernels()}",
         "method": method,

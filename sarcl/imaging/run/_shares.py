@@ -24,9 +24,17 @@ class Shares:
     """
 
     def __init__(
-        self, tiling: Tiling, todo: list[Run], *, most: float, unit: int, ends: Sequence[set[int]],
-        least: Sequence[float], rates: Sequence[float], now: Callable[[], float] = time.monotonic,
-    ) -> None:  # fmt: skip
+        self,
+        tiling: Tiling,
+        todo: list[Run],
+        *,
+        most: float,
+        unit: int,
+        ends: Sequence[set[int]],
+        least: Sequence[float],
+        rates: Sequence[float],
+        now: Callable[[], float] = time.monotonic,
+    ) -> None:
         """most    pixels of a block, at most;  unit  blocks begin at multiples of so many bands if possible
         ends    for each device: bands that its blocks may not cross
         least   for each device: Engine.least_pixels
@@ -83,26 +91,24 @@ class Shares:
         for done, busy, began in zip(self._done, self._busy, self._began, strict=True):
             seconds = busy + (0.0 if began is None else self._now() - began)
             shown.append(done / seconds if done > 0 and seconds > 0 else None)
-        known = [v / rate for v, rate in zip(shown, self._rates, strict=True) if v is not None]
-        scale = sum(known) / len(known) if known else 1.0
+        scales = [v / rate for v, rate in zip(shown, self._rates, strict=True) if v is not None]
+        scale = sum(scales) / len(scales) if scales else 1.0
         return [rate * scale if v is None else v for v, rate in zip(shown, self._rates, strict=True)]
 
     def _part(self, k: int) -> float:
         """Pixels that device k should take now."""
-        left, speeds = float(sum(self.tiling.count(*run) for run in self._left)), self._speeds()
+        remainder, speeds = float(sum(self.tiling.count(*run) for run in self._left)), self._speeds()
         # seconds from now at which each device is free, and when all end if they share what is left
-        free = {
-            j: (self._taken[j] - self._done[j]) / speeds[j] if j != k else 0.0
-            for j in range(len(speeds)) if self._active[j]
-        }  # fmt: skip
+        active = [j for j in range(len(speeds)) if self._active[j]]
+        free = {j: (self._taken[j] - self._done[j]) / speeds[j] if j != k else 0.0 for j in active}
         work = speed = 0.0
         end = float("inf")
         for j in sorted(free, key=free.__getitem__):
             if free[j] >= end:
                 break
             work, speed = work + speeds[j] * free[j], speed + speeds[j]
-            end = (left + work) / speed
-        share = min(speeds[k] * end, left)
+            end = (remainder + work) / speed
+        share = min(speeds[k] * end, remainder)
         sure = self._alike or self._done[k] > 0
         rest = share * (1 - (SURE if sure else UNSURE))
         worth = self.least[k] if sure else WORTH * self.least[k]

@@ -111,11 +111,7 @@ class Checkpoint:
         except (OSError, TypeError) as exc:
             if self.resume:
                 raise
-            log.warning(
-                "finished tiles cannot be kept in %s: %s; a killed run would start again",
-                self.folder,
-                exc,
-            )
+            log.warning("finished tiles cannot be kept in %s: %s; a killed run would start again", self.folder, exc)
             self.resume = False
         self._waiting.clear()
 

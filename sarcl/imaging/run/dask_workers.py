@@ -69,9 +69,14 @@ class DaskWorkers:
         self.worker_task = WorkerTask(replace(task, raw=raw), chosen, device, max_bytes, secrets.token_hex(8))
 
     def work(
-        self, todo: list[Run], most: float, unit: int, output_for: OutputFor, clock: Clock,
+        self,
+        todo: list[Run],
+        most: float,
+        unit: int,
+        output_for: OutputFor,
+        clock: Clock,
         on_progress: Callable[[int], None],
-    ) -> Generator[FinishedBlock, None, None]:  # fmt: skip
+    ) -> Generator[FinishedBlock, None, None]:
         """See WorkerPool; progress is reported block by block."""
         from distributed import as_completed
 
@@ -160,14 +165,16 @@ class InFile:
     def __getitem__(self, rows: slice) -> np.ndarray:
         if self._open is None:
             try:
-                found = sarcl_hdf5.open_rows(self.file, self.name)
+                rows_in_file = sarcl_hdf5.open_rows(self.file, self.name)
             except (OSError, KeyError) as exc:
                 raise OSError(
                     f"{self.file!r} cannot be read here ({exc}); every worker needs it under this name"
                 ) from None
-            if found.shape != self.shape or found.dtype != self.dtype:
-                raise ValueError(f"{self.file!r} is another file here: its {self.name} are {found.shape} {found.dtype}")
-            self._open = found
+            if rows_in_file.shape != self.shape or rows_in_file.dtype != self.dtype:
+                raise ValueError(
+                    f"{self.file!r} is another file here: its {self.name} are {rows_in_file.shape} {rows_in_file.dtype}"
+                )
+            self._open = rows_in_file
         return np.asarray(self._open[rows])
 
 

@@ -82,9 +82,9 @@ class BandBuffer:
     image."""
 
     def __init__(self, tiling: Tiling, first: int, last: int, dtype: DTypeLike) -> None:
-        at = tiling.extent(first, last)
-        self.start = at.start
-        self.values = np.empty((at.stop - at.start, *tiling.row_shape), dtype)
+        extent = tiling.extent(first, last)
+        self.start = extent.start
+        self.values = np.empty((extent.stop - extent.start, *tiling.row_shape), dtype)
 
     def __getitem__(self, rows: slice) -> np.ndarray:
         return self.values[rows.start - self.start : rows.stop - self.start]
@@ -101,8 +101,8 @@ def is_path(out: object) -> TypeGuard[PathLike]:
     name = os.fspath(out)
     among = formats.writing("image", by_blocks=True)
     if not isinstance(name, str) or formats.named(name, among) is None:
-        wanted = formats.suggested(among)
-        raise ValueError(f"out is {name!r}; images are made in HDF5 files: give a name that ends in {wanted}")
+        endings = formats.suggested(among)
+        raise ValueError(f"out is {name!r}; images are made in HDF5 files: give a name that ends in {endings}")
     return True
 
 

@@ -6,20 +6,20 @@ import logging
 import queue
 import threading
 from collections.abc import Callable, Generator
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from ...base.stage_timer import Clock
 from ...opencl.failures import DeviceFailed
 from ..engine import Engine, Skipped
-from ..tiling.tiling import Run, Tiling
+from ..tiling.tiling import FlatImage, Run, Tiling
 from ._shares import Shares
 
 log = logging.getLogger(__name__)
 
-FinishedBlock = tuple[int, int, Any, Skipped]  # a run of bands, where its pixels are, and pairs skipped
-OutputFor = Callable[[int, int], Any]  # destination of the pixels of a run of bands: a flat image or a BandBuffer
+FinishedBlock = tuple[int, int, FlatImage, Skipped]  # a run of bands, where its pixels are, and pairs skipped
+OutputFor = Callable[[int, int], FlatImage]  # destination of the pixels of a run of bands: a flat image or a BandBuffer
 
 
 class WorkerPool(Protocol):
@@ -40,9 +40,14 @@ class WorkerPool(Protocol):
     def least_pixels(self) -> float: ...
 
     def work(
-        self, todo: list[Run], most: float, unit: int, output_for: OutputFor, clock: Clock,
+        self,
+        todo: list[Run],
+        most: float,
+        unit: int,
+        output_for: OutputFor,
+        clock: Clock,
         on_progress: Callable[[int], None],
-    ) -> Generator[FinishedBlock, None, None]:  # fmt: skip
+    ) -> Generator[FinishedBlock, None, None]:
         """Focus the bands of `todo`, in blocks of about `most` pixels at most, which begin at multiples of `unit` bands
         if possible, each into output_for(first, last); yields each when it is finished, in any order.
 
@@ -79,9 +84,14 @@ class LocalWorkers:
         self.least_pixels = max(float(engine.least_pixels) for engine in engines)
 
     def work(
-        self, todo: list[Run], most: float, unit: int, output_for: OutputFor, clock: Clock,
+        self,
+        todo: list[Run],
+        most: float,
+        unit: int,
+        output_for: OutputFor,
+        clock: Clock,
         on_progress: Callable[[int], None],
-    ) -> Generator[FinishedBlock, None, None]:  # fmt: skip
+    ) -> Generator[FinishedBlock, None, None]:
         """See WorkerPool."""
         each = zip(self.engines, self.budgets, strict=True)
         ends = [{last for _, last in engine.blocks(budget)} for engine, budget in each]
@@ -164,8 +174,8 @@ class LocalWorkers:
         on_progress(0)
         threads = {k: started(k) for k in range(self.size)}
         try:
-            tiling, left = self.engines[0].tiling, pixels
-            while left:
+            tiling, running = self.engines[0].tiling, pixels
+            while running:
                 try:
                     done = finished.get(timeout=0.1)
                 except queue.Empty:
@@ -175,7 +185,7 @@ class LocalWorkers:
                     continue
                 if isinstance(done, BaseException):
                     raise done
-                left -= tiling.count(done[0], done[1])
+                running -= tiling.count(done[0], done[1])
                 clock.lap("backproject")
                 on_progress(sum(pairs))
                 yield done

@@ -35,12 +35,12 @@ class _Curve:
 
     def order(self, band: int, points: np.ndarray) -> np.ndarray:
         """The order of the points (n, 3) of a band."""
-        found = self.orders.get(band)
-        if found is None:
-            found = morton_order(points).astype(np.int32)
-            if sum(map(len, [*self.orders.values()])) + len(found) <= KEPT:
-                self.orders[band] = found
-        return found
+        order = self.orders.get(band)
+        if order is None:
+            order = morton_order(points).astype(np.int32)
+            if sum(map(len, [*self.orders.values()])) + len(order) <= KEPT:
+                self.orders[band] = order
+        return order
 
 
 _curves: WeakKeyDictionary[ImageGrid, _Curve] = WeakKeyDictionary()
@@ -152,12 +152,12 @@ class PointTiling(Tiling):
             yield Part(*run, low, min(low + step, roots))
 
     def sections(self, parts: Iterable[Part], factors: Sequence[int]) -> Iterator[Section]:
-        for run, some in itertools.groupby(parts, lambda part: part[:2]):
+        for run, parts_of_run in itertools.groupby(parts, lambda part: part[:2]):
             tiles, orders = self.bands(*run)
             tree, sizes = self._tree(tiles, run, factors), self.tile_sizes(*run)
             line = np.repeat(range(*run), [self.n_roots(b, b + 1, factors[0]) for b in range(*run)])
             roots = Roots(tree.centers[0], line)
-            for part in some:
+            for part in parts_of_run:
                 below = tree.part(part.low, part.high)
                 yield Section(part, below, roots, np.arange(part.low, part.high), sizes[below.slot], orders)
 

@@ -27,7 +27,7 @@ class FlatImage(Protocol):
 
     def __getitem__(self, rows: slice, /) -> np.ndarray: ...
 
-    def __setitem__(self, rows_and_columns: slice | tuple[slice, slice], block: np.ndarray, /) -> None: ...
+    def __setitem__(self, at: slice | tuple[slice, slice], block: np.ndarray, /) -> None: ...
 
 
 class Part(NamedTuple):
@@ -188,8 +188,8 @@ class Tiling(ABC):
 
     def count(self, first: int, last: int) -> int:
         """Pixels of bands first ... last - 1, empty cells included, without padding."""
-        at = self.extent(first, last)
-        return int((at.stop - at.start) * np.prod(self.row_shape, dtype=np.int64))
+        extent = self.extent(first, last)
+        return int((extent.stop - extent.start) * np.prod(self.row_shape, dtype=np.int64))
 
     def blocks(self, most: int) -> list[Run]:
         """All bands in runs of `most` pixels, padding included, at most; a band that is alone may be larger."""
@@ -225,10 +225,10 @@ class Tiling(ABC):
 def download_sums(device: Device, sums: Buffer, n: int, kind: type[np.floating] = np.float32) -> np.ndarray:
     """Pixels (n,), complex of twice the bytes of `kind`, from compensated sums (4, n) on the device."""
     if kind == np.float32:  # added up there: half of the bytes are downloaded
-        made, first = device.empty(8 * n), device.upload(np.zeros(1, np.int32))
+        pixels, first = device.empty(8 * n), device.upload(np.zeros(1, np.int32))
         untile = device.kernel("assemble_image.cl", "untile")
         numbers = launch_numbers("assemble_image.cl", "untile", pixels=n, across=1, high=1, wide=n, columns=n)
-        device.run(untile, (n, 1), None, numbers, sums, first, made)
-        return device.download(made, np.empty(n, np.complex64))
+        device.run(untile, (n, 1), None, numbers, sums, first, pixels)
+        return device.download(pixels, np.empty(n, np.complex64))
     real, imaginary, real_rest, imaginary_rest = device.download(sums, np.empty((4, n), kind))
     return np.asarray((real + real_rest) + 1j * (imaginary + imaginary_rest))
