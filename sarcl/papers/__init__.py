@@ -62,5 +62,5 @@ def open_lab(
     """
     from ..opencl.choose_device import open_device
 
-    given: dict[str, Any] = {"folder": folder, "progress": progress} if paper.long else {}
-    return paper.lab(open_device(device), quick, **given)
+    options: dict[str, Any] = {"folder": folder, "progress": progress} if paper.long else {}
+    return paper.lab(open_device(device), quick, **options)
