@@ -9,7 +9,7 @@ import tempfile
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -65,25 +65,19 @@ def run(
         choice("scene", scene, _cases.SCENES)
     for method in methods:
         choice("method", method, METHODS)
-    wanted = [number(f"tolerances[{i}]", t, above=0) for i, t in enumerate(tolerances)]
+    errors = [number(f"tolerances[{i}]", t, above=0) for i, t in enumerate(tolerances)]
     sizes = sorted({count(f"sizes[{i}]", n, least=8) for i, n in enumerate(sizes)})
     repeats, pixels = count("repeats", repeats), count("pixels", pixels, least=256)
     limit, patience = number("limit", limit, above=0), number("patience", patience, least=0)
     python = _peers.check_python(peer_python)
     opened = [open_device(d) for d in _listed(devices)]
-    twins = [d.without_fp64() for d in opened if no_fp64 and d.info.fp64]
-    opened += twins
-
+    opened += [d.without_fp64() for d in opened if no_fp64 and d.info.fp64]
     document: Document = {**header(opened), "cases": []}
     with ExitStack() as stack:
         peer = None
         if with_peers:
-            try:
-                peer = stack.enter_context(_peers.Peer(python))
-                found = {"version": peer.version, "python": peer.python, "backend": peer_backend}
-            except Absent as exc:
-                found = {"absent": f"{exc}; --peer-python PATH names a Python that has it"}
-            document["peers"].append({"name": "fastsar", **found})
+            peer, description = _opened_peer(stack, python, peer_backend)
+            document["peers"].append(description)
         for line in tables.machine_text(document):
             say(line)
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="sarcl-bench-")))
@@ -94,7 +88,7 @@ def run(
                 case = _cases.make(scene, n, data, pixels)
                 _cases.save(case, folder)
                 progress("data", 1, 1)
-                lines = _run_sarcl.competitors(case, folder, opened, methods, wanted)
+                lines = _run_sarcl.competitors(case, folder, opened, methods, errors)
                 others = _others(case, folder, peer, peer_backend, methods) if with_peers else []
                 rows = measure(
                     case,
@@ -105,13 +99,14 @@ def run(
                     patience=patience,
                     tick=lambda done, total: progress("bench", done, total),
                 )
+                norm = float(np.linalg.norm(case.wanted)) / case.norm
                 result = {
                     "scene": scene,
                     "data": case.data,
                     "n": n,
                     "pairs": case.pairs,
                     "pixels": pixels,
-                    "norm": float(np.linalg.norm(case.wanted)) / case.norm,
+                    "norm": norm,
                     "rows": rows,
                 }
                 document["cases"].append(result)
@@ -125,25 +120,34 @@ def run(
     return document
 
 
+def _opened_peer(stack: ExitStack, python: str, backend: str) -> tuple[_peers.Peer | None, dict[str, str]]:
+    """The running peer, closed with `stack`, or None where it is absent; and its entry in the document."""
+    try:
+        peer = stack.enter_context(_peers.Peer(python))
+    except Absent as exc:
+        return None, {"name": "fastsar", "absent": f"{exc}; --peer-python PATH names a Python that has it"}
+    return peer, {"name": "fastsar", "version": peer.version, "python": peer.python, "backend": backend}
+
+
 def _others(
     case: _cases.BenchCase, folder: Path, peer: _peers.Peer | None, backend: str, methods: Sequence[str]
 ) -> list[Any]:
     """The NumPy baseline, and the peer where there is one."""
-    found = []
+    others = []
     if "direct" in methods:
-        found += _baseline.competitors(case)
+        others += _baseline.competitors(case)
     if peer is not None:
         try:
             peer.load(folder)
-            found += _peers.competitors(case, peer, methods, backend)
+            others += _peers.competitors(case, peer, methods, backend)
         except Absent as exc:
             lost = str(exc)
 
-            def gone() -> Any:
+            def gone() -> NoReturn:
                 raise Absent(lost)
 
-            found += [_competitor.Competitor(peer.name, backend, method, "any", gone) for method in methods]
-    return found
+            others += [_competitor.Competitor(peer.name, backend, method, "any", gone) for method in methods]
+    return others
 
 
 def _listed(devices: Sequence[Any] | None) -> list[Any]:
@@ -202,7 +206,7 @@ def write(document: Document, path: Path) -> None:
         part.write_text(json.dumps(document, indent=1, default=_plain) + "\n")
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: object) -> object:
     """NumPy numbers of a plan as plain numbers, lists or text."""
     if isinstance(value, np.generic):
         return value.item()

@@ -65,8 +65,8 @@ def html(
     if not finished:
         blocks.insert(1, words("Not finished: more cases follow.", True))
     blocks += _trends.summary(results, finished)
-    for made in sections or map(section, results):
-        blocks += made
+    for blocks_of_cases in sections or map(section, results):
+        blocks += blocks_of_cases
     return page(title, blocks, command)
 
 

@@ -119,8 +119,9 @@ def _array(result: Mapping[str, Any]) -> str:
     }.get(kind, "")
     switch = (
         "; from mid-aperture on the carriers run in reverse over the elements, at the same centre frequency"
-        if result["mirrored"] else ""
-    )  # fmt: skip
+        if result["mirrored"]
+        else ""
+    )
     apart = f"{result['spacing']:.4g} m" if result["spacing"] >= 1 else f"{1e3 * result['spacing']:.4g} mm"
     text = (
         f"{' x '.join(str(i) for i in np.atleast_1d(n))} elements {apart} apart {where}, with carriers from "
