@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import secrets
 import threading
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Generator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -32,7 +32,7 @@ from ..engine import Engine, Skipped
 from ..focusing_task import FocusingTask
 from ..tiling.tiling import Run
 from .image_output import BandBuffer
-from .workers import FinishedBlock, OutputFor, cut
+from .workers import FinishedBlock, Work, cut
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -68,24 +68,16 @@ class DaskWorkers:
         raw = replace(task.raw, samples=portable(task.raw.samples))
         self.worker_task = WorkerTask(replace(task, raw=raw), chosen, device, max_bytes, secrets.token_hex(8))
 
-    def work(
-        self,
-        todo: list[Run],
-        most: float,
-        unit: int,
-        output_for: OutputFor,
-        clock: Clock,
-        on_progress: Callable[[int], None],
-    ) -> Generator[FinishedBlock, None, None]:
+    def focus(self, work: Work) -> Generator[FinishedBlock, None, None]:
         """See WorkerPool; progress is reported block by block."""
         from distributed import as_completed
 
         lost = _losses()
-        pixels = sum(self.tiling.count(*run) for run in todo)
+        most, pixels = work.most, sum(self.tiling.count(*run) for run in work.todo)
         if self.size > 1:
             most = min(most, pixels / (BLOCKS_EACH * self.size))
-        blocks = cut(self.tiling, todo, most, set(), unit)
-        on_progress(0)
+        blocks = cut(self.tiling, work.todo, most, set(), work.unit)
+        work.on_progress(0)
         if not blocks:
             return
         futures: list[Any] = []
@@ -99,11 +91,11 @@ class DaskWorkers:
                 values, skipped, name = future.result()
                 future.release()
                 self.names = sorted({*self.names, name})
-                flat = output_for(first, last)
+                flat = work.output_for(first, last)
                 flat[self.tiling.extent(first, last)] = values
-                clock.lap("backproject")
+                work.clock.lap("backproject")
                 pairs, done = pairs + self.n_rows * self.tiling.count(first, last), done + 1
-                on_progress(pairs)
+                work.on_progress(pairs)
                 yield first, last, flat, skipped
         except lost as exc:
             raise DeviceFailed(

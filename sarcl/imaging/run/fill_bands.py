@@ -15,7 +15,7 @@ from ..tiling.tiling import FlatImage, Run
 from .checkpoint import Checkpoint
 from .image_output import BandBuffer, ImageOutput
 from .tile_files import gaps
-from .workers import WorkerPool
+from .workers import Work, WorkerPool
 
 MOST_FILES = 64  # blocks per image, where finished tiles are written to files: each block makes one file
 
@@ -63,8 +63,9 @@ class BandFiller:
         self.clock.lap("files")
         focused = []
         try:
-            with closing(self.workers.work(todo, most, self.chosen.unit, output_for, self.clock, on_progress)) as work:
-                for first, last, flat, missed in work:
+            work = Work(todo, most, self.chosen.unit, output_for, self.clock, on_progress)
+            with closing(self.workers.focus(work)) as blocks:
+                for first, last, flat, missed in blocks:
                     focused.append((first, last))
                     skipped += missed
                     if checkpoint:
