@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import os
 import platform
 import tempfile
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -27,6 +29,16 @@ from ._measure import Paces, alternate, measure
 TOLERANCES = (1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 1e-5, 1e-6)
 FORMAT = 2  # of the document
 Document = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class _Effort:
+    """Runs of each row, pixels checked, and seconds: the longest run, and the wait until no other program runs."""
+
+    repeats: int
+    pixels: int
+    limit: float
+    patience: float
 
 
 def run(
@@ -67,11 +79,14 @@ def run(
         choice("method", method, METHODS)
     errors = [number(f"tolerances[{i}]", t, above=0) for i, t in enumerate(tolerances)]
     sizes = sorted({count(f"sizes[{i}]", n, least=8) for i, n in enumerate(sizes)})
-    repeats, pixels = count("repeats", repeats), count("pixels", pixels, least=256)
-    limit, patience = number("limit", limit, above=0), number("patience", patience, least=0)
+    effort = _Effort(
+        count("repeats", repeats),
+        count("pixels", pixels, least=256),
+        number("limit", limit, above=0),
+        number("patience", patience, least=0),
+    )
     python = _peers.check_python(peer_python)
-    opened = [open_device(d) for d in _listed(devices)]
-    opened += [d.without_fp64() for d in opened if no_fp64 and d.info.fp64]
+    opened = _opened_devices(devices, no_fp64)
     document: Document = {**header(opened), "cases": []}
     with ExitStack() as stack:
         peer = None
@@ -85,39 +100,41 @@ def run(
             paces: Paces = {}
             for n in sizes:
                 progress("data", 0, 1)
-                case = _cases.make(scene, n, data, pixels)
+                case = _cases.make(scene, n, data, effort.pixels)
                 _cases.save(case, folder)
                 progress("data", 1, 1)
                 lines = _run_sarcl.competitors(case, folder, opened, methods, errors)
                 others = _others(case, folder, peer, peer_backend, methods) if with_peers else []
-                rows = measure(
-                    case,
-                    alternate(lines, others),
-                    repeats=repeats,
-                    limit=limit,
-                    paces=paces,
-                    patience=patience,
-                    tick=lambda done, total: progress("bench", done, total),
-                )
-                norm = float(np.linalg.norm(case.wanted)) / case.norm
-                result = {
-                    "scene": scene,
-                    "data": case.data,
-                    "n": n,
-                    "pairs": case.pairs,
-                    "pixels": pixels,
-                    "norm": norm,
-                    "rows": rows,
-                }
+                result = _result(case, alternate(lines, others), effort, paces, functools.partial(progress, "bench"))
                 document["cases"].append(result)
                 document["machine"]["load"] = [document["machine"]["load"][0], *load()]
                 keep(document)
                 say("\n" + tables.text(result))
-    growth = tables.growth_text(document["cases"])
-    if growth:
-        say("\n" + growth)
-    say("\n" + tables.EXPLAINED)
+    for paragraph in filter(None, (tables.growth_text(document["cases"]), tables.EXPLAINED)):
+        say("\n" + paragraph)
     return document
+
+
+def _result(
+    case: _cases.BenchCase,
+    competitors: list[_competitor.Competitor],
+    effort: _Effort,
+    paces: Paces,
+    tick: Callable[[int, int], None],
+) -> dict[str, Any]:
+    """The entry of a case in the document, measured."""
+    rows = measure(
+        case,
+        competitors,
+        repeats=effort.repeats,
+        limit=effort.limit,
+        paces=paces,
+        patience=effort.patience,
+        tick=tick,
+    )
+    norm = float(np.linalg.norm(case.wanted)) / case.norm
+    setting = {"scene": case.scene, "data": case.data, "n": case.n, "pairs": case.pairs, "pixels": effort.pixels}
+    return {**setting, "norm": norm, "rows": rows}
 
 
 def _opened_peer(stack: ExitStack, python: str, backend: str) -> tuple[_peers.Peer | None, dict[str, str]]:
@@ -150,10 +167,12 @@ def _others(
     return others
 
 
-def _listed(devices: Sequence[Any] | None) -> list[Any]:
-    if devices:
-        return list(dict.fromkeys(devices))
-    return [info.index for info in device_list.devices() if info.works] or [None]
+def _opened_devices(devices: Sequence[Any] | None, no_fp64: bool) -> list[Device]:
+    """The devices, all that work by default, and with no_fp64 a twin without float64 of each that has it."""
+    if not devices:
+        devices = [info.index for info in device_list.devices() if info.works] or [None]
+    opened = [open_device(device) for device in dict.fromkeys(devices)]
+    return opened + [device.without_fp64() for device in opened if no_fp64 and device.info.fp64]
 
 
 def _device(device: Device) -> dict[str, Any]:

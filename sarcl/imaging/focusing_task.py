@@ -194,15 +194,20 @@ def places_of(raw: PhaseHistory) -> np.ndarray:
 
     Channels of fewer rows than the longest are stretched to its length, so that all share an aperture.
     """
+    channels = _channels(raw)
+    longest, places = max(len(rows) for rows in channels), np.zeros(raw.n_rows)
+    for rows in channels:
+        stretched = (np.arange(len(rows)) + 0.5) / len(rows) * longest - 0.5
+        places[rows] = stretched if len(rows) < longest else np.arange(longest)
+    return places
+
+
+def _channels(raw: PhaseHistory) -> list[np.ndarray]:
+    """Rows of each channel and polarisation, in the order of time."""
     when = np.arange(raw.n_rows) if raw.time is None else np.argsort(np.argsort(raw.time, kind="stable"))
     group = groups(raw.n_rows, raw.tx_channel, raw.rx_channel, raw.polarization)
-    longest = int(np.bincount(group).max())
-    places = np.zeros(raw.n_rows)
-    for g in np.unique(group):
-        members = np.flatnonzero(group == g)
-        stretched = (np.arange(len(members)) + 0.5) / len(members) * longest - 0.5
-        places[members[np.argsort(when[members])]] = stretched if len(members) < longest else np.arange(longest)
-    return places
+    members = (np.flatnonzero(group == g) for g in np.unique(group))
+    return [rows[np.argsort(when[rows])] for rows in members]
 
 
 def check_polarizations(
@@ -234,11 +239,8 @@ def weigh(raw: PhaseHistory, window: Window | None, weights: ArrayLike | None) -
     across, along = windows.both(window)
     rows = np.ones(raw.n_rows)
     if along is not None:
-        when = np.arange(raw.n_rows) if raw.time is None else np.argsort(np.argsort(raw.time, kind="stable"))
-        group = groups(raw.n_rows, raw.tx_channel, raw.rx_channel, raw.polarization)
-        for g in np.unique(group):
-            members = np.flatnonzero(group == g)
-            rows[members[np.argsort(when[members])]] = windows.weights(along, len(members))
+        for channel in _channels(raw):
+            rows[channel] = windows.weights(along, len(channel))
     if raw.weight is not None:
         rows = rows * raw.weight
     if weights is not None:

@@ -42,9 +42,9 @@ def patterns(lab: Lab) -> Section:
         return power, (float(ANGLES[row]), float(ANGLES[column]))
 
     still, at = look(plain, 0.0)
-    rule_text = "that direction, on a grid of 1 deg"
+    rule = "that direction, on a grid of 1 deg"
     out.states(
-        "CFA: beam", "figure 3.3, equations 3.29, 3.30", "(0, 0) deg", _deg(at), at == (0, 0), value=at, rule=rule_text
+        "CFA: beam", "figure 3.3, equations 3.29, 3.30", "(0, 0) deg", _deg(at), at == (0, 0), value=at, rule=rule
     )
     figures = [_sky(still, "One carrier (figure 3.3).")]
     for plane, figure, elevated in (("azimuth", "3.5", False), ("elevation", "3.4", True)):
@@ -65,8 +65,8 @@ def patterns(lab: Lab) -> Section:
     start, _ = look(diverse, 0.0)
     off = float(np.abs(start - still).max())
     measured = f"differs by {off:.1e}"
-    rule_text = "below 0.01 of the peak"
-    out.states("FDA at t' = 0", "figure 3.6", "identical to the CFA", measured, off < 1e-2, value=off, rule=rule_text)
+    rule = "below 0.01 of the peak"
+    out.states("FDA at t' = 0", "figure 3.6", "identical to the CFA", measured, off < 1e-2, value=off, rule=rule)
     figures.append(_sky(start, "Diverse carriers at t' = 0 (figure 3.6)."))
     for sign in (1, -1):
         power, at = look(diverse, sign * TIME)

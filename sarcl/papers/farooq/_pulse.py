@@ -50,9 +50,9 @@ def waveform(lab: Lab) -> Section:
     rule = "more than 95 % of the energy"
     out.states("bandwidth", "figure 4.5, equation 4.18", "9 GHz", measured, share > 0.95, value=share, rule=rule)
     crossing = 20 * np.log10(float(channels[0][np.isclose(f, F0 + STEP / 2, atol=2e6)].max()))
-    item_text = "neighbouring channels cross"
+    item = "neighbouring channels cross"
     out.states(
-        item_text, "figure 4.4", "below 3 dB", f"{crossing:.2f} dB", crossing < -3, value=crossing, rule="below -3 dB"
+        item, "figure 4.4", "below 3 dB", f"{crossing:.2f} dB", crossing < -3, value=crossing, rule="below -3 dB"
     )
     out.say(
         "Exact field at boresight. A pulse as long as the period has one peak; its spectrum is nine tones side by side."

@@ -110,13 +110,13 @@ def _maps_of_cells(
     along, across = ((middles - origin) @ axes[i] for i in (1, 0))
     ground_map = summed(power, along, across, (_edges(ground_places[0]), _edges(ground_places[1])))
     ends = [(float(places[0]), float(places[-1])) for places in ground_places]
-    for cells, caption, name in (
+    for cells, plane, name in (
         (ground_map, "on the ground", "ground range, m"),
         (slant_map, "in the slant plane: foreshortening and layover", "ground range of the slant range, m"),
     ):
-        caption_text = f"Power of the facets in cells {caption} (figure 7)."
+        caption = f"Power of the facets in cells {plane} (figure 7)."
         out.picture(
-            _db(cells), ends[1], ends[0], name, "azimuth, m", caption_text, floor_db=-30.0, percentile=99.5, equal=True
+            _db(cells), ends[1], ends[0], name, "azimuth, m", caption, floor_db=-30.0, percentile=99.5, equal=True
         )
     alike, unlike = (correlation(image, cells, AVERAGED) for cells in (slant_map, ground_map))
     out.states(

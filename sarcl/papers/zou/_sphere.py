@@ -36,20 +36,18 @@ def section(lab: Lab) -> Section:
     mie = np.array([conducting_sphere(a, 2 * np.pi * v / SPEED_OF_LIGHT)[0] for v in f])
     samples = raw.read(0, raw.n_rows)
     apart = float(np.linalg.norm(samples - mie) / (np.linalg.norm(mie) * np.sqrt(raw.n_rows)))
-    item_text = "sphere: echoes in HH against Mie's series"
+    item = "sphere: echoes in HH against Mie's series"
     rule = f"complex error over all pulses and frequencies below {ECHO_ERROR:.0%}"
     out.states(
-        item_text, "Mie", "exact", f"differ by {apart:.1%}", apart < ECHO_ERROR, value=apart, rule=rule, basis="theory"
+        item, "Mie", "exact", f"differ by {apart:.1%}", apart < ECHO_ERROR, value=apart, rule=rule, basis="theory"
     )
     optics = np.asarray(lab.optics("sphere").samples)
     closed = optics_of_sphere(a, 2 * np.pi * f / SPEED_OF_LIGHT)
     off = float(np.linalg.norm(optics - closed) / (np.linalg.norm(closed) * np.sqrt(len(optics))))
-    item_text = "sphere: echoes of physical optics against their closed form"
+    item = "sphere: echoes of physical optics against their closed form"
     source = "currents of the lit half of a sphere"
     rule = f"complex error over all pulses and frequencies below {OPTICS_ERROR:.0%}: the sphere has flat facets"
-    out.states(
-        item_text, source, "exact", f"differ by {off:.1%}", off < OPTICS_ERROR, value=off, basis="theory", rule=rule
-    )
+    out.states(item, source, "exact", f"differ by {off:.1%}", off < OPTICS_ERROR, value=off, basis="theory", rule=rule)
     cross = both.select(polarization="VH").read(0, raw.n_rows)
     level = float(20 * np.log10(np.linalg.norm(cross) / np.linalg.norm(samples)))
     out.states(
