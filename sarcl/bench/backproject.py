@@ -27,7 +27,7 @@ from ._competitor import Absent
 from ._measure import Paces, alternate, measure
 
 TOLERANCES = (1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 1e-5, 1e-6)
-FORMAT = 2  # of the document
+FORMAT = 2  # version of the document
 Document = dict[str, Any]
 
 

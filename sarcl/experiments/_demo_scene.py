@@ -29,7 +29,7 @@ ROUGH = Material(diagram="cos")  # rough on a scale below the facets, so that ev
 # such facets is clipped exactly
 SLIGHTLY_ROUGH = Material(diagram="cos", height=4e-3)
 APRON, APRON_SIZE = (13.0, 9.5), (17.0, 12.0)  # m: middle and sides of the slab before the hangar
-APRON_HEIGHT = 0.03  # m, of the slab above the ground
+APRON_HEIGHT = 0.03  # m, height of the slab above the ground
 FLAT_BEYOND = 3.0  # m about the apron, over which the ground rises to its own height
 
 

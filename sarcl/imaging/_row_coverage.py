@@ -1,4 +1,4 @@
-"""Which rows saw a pixel, and the sum of their weights: the gain of the image, pixel by pixel.
+"""Rows that saw a pixel, and the sum of their weights: the gain of the image, pixel by pixel.
 
     gain(x) = sum_p v_p(x) w_p sum_n w_n,    v_p(x) = 1 in the range window and the beam of row p, else 0
 
@@ -24,9 +24,9 @@ from .focusing_task import FocusingTask
 from .tiling.of_grid import tiling_of
 
 SIDE = 16  # pixels along a side of a tile
-ROWS = 256  # of Image.aperture, at most
+ROWS = 256  # rows of Image.aperture, at most
 PAIRS = 2**20  # pairs of a tile and a row that are looked at together
-SLACK = 1e-9  # of the largest distance: rounding of the distances of tiles, which are differences of squares
+SLACK = 1e-9  # share of the largest distance, by which distances of tiles are rounded, which are differences of squares
 
 
 def may_vary(task: FocusingTask) -> bool:

@@ -24,12 +24,12 @@ from functools import cached_property
 
 import numpy as np
 
-FAINTEST = 1e-20  # of the power beside the pixels: where every pixel is at an exact null of every row
+FAINTEST = 1e-20  # share of the power beside the pixels, taken where every pixel is at an exact null of every row
 
 
 @dataclass(eq=False)
 class RowsInPhase:
-    """What a few rows contribute to some pixels, and beside them; 0 where a row does not see a pixel.
+    """Contributions of a few rows to some pixels, and beside them; 0 where a row does not see a pixel.
 
     delays  d_p (n_rows, n), in fractions of the range window
     values  c_p P_p(d_p), complex128 (n_rows, n);  beside  c_p Q_p(d_p + d) at some delays d, (n_rows, n, n_beside)

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from .focusing_task import FocusingTask
 
 AntennaBeam: TypeAlias = Antenna | tuple[Antenna, ArrayLike | Trajectory]  # and its direction or attitude
-PIXELS, ROWS = 256, 64  # from which the mean gain is estimated
+PIXELS, ROWS = 256, 64  # pixels and rows from which the mean gain is estimated
 LEAST_DISTANCE = 1e-6  # radii of a tile: no direction is left so near to an antenna
 
 
@@ -125,7 +125,7 @@ def shares(task: FocusingTask, points: np.ndarray) -> np.ndarray:
 
 
 class AntennaOnDevice:
-    """What the kernels read of an antenna; gain  True: they add up |g|^2 times the rows' weights, not the echoes."""
+    """Buffers of an antenna for the kernels; gain  True: they add up |g|^2 times the rows' weights, not the echoes."""
 
     def __init__(self, device: Device, task: FocusingTask, gain: bool) -> None:
         assert task.antenna is not None

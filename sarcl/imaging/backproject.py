@@ -176,7 +176,7 @@ class BackprojectPlan:
         return LocalWorkers(engines, budgets, [d.info.name for d in devices], task.raw.n_rows, rates)
 
     def _fields(self, filler: BandFiller, skipped: Skipped, n_kept: int, output: ImageOutput) -> dict[str, Any]:
-        """What the Image says of its data: gain, carrier, collection, report; warns of pixels that no row sees.
+        """Fields of the Image about its data: gain, carrier, collection, report; warns of pixels that no row sees.
 
         n_kept  bands that files of earlier runs held
         """

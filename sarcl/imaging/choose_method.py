@@ -239,7 +239,7 @@ def _direct(task: FocusingTask, tolerance: float, devices: DeviceClass, float64:
 
 
 def _without_float64(task: FocusingTask, float64: bool) -> str:
-    """What to do where complex64 cannot meet a tolerance and no sums in complex128 can be made; "": they can."""
+    """Remedy where complex64 cannot meet a tolerance and no sums in complex128 can be made; "": they can."""
     if task.antenna is not None:
         return "give the beam an angle"
     if not float64:

@@ -1,4 +1,4 @@
-"""What every method of focusing offers: a plan, and an engine that makes bands of the image on one device."""
+"""Base classes of the methods of focusing: a plan, and an engine that makes bands of the image on one device."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Skipped:
 
 
 class ImagePlan(Protocol):
-    """How a method makes an image. It depends on the task and the tolerance, never on the memory of a device."""
+    """Plan of an image by a method. It depends on the task and the tolerance, never on the memory of a device."""
 
     @property
     def predicted_error(self) -> float:

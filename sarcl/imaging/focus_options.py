@@ -16,7 +16,7 @@ from ..numerics.run_options import RunOptions
 from ..numerics.windows import Window
 
 EXACT_PAIR = 3e-8  # s, of the exact sum, per sample and pixel
-CHEAP_CHECK = 0.02  # of the time of the image: a check that costs less is made without being asked for
+CHEAP_CHECK = 0.02  # share of the time of the image: a check that costs less is made by default
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -21,7 +21,7 @@ from .focusing_task import FocusingTask
 if TYPE_CHECKING:
     from ..opencl.device import Buffer
 
-CELLS = 2**14  # of a table in float32
+CELLS = 2**14  # cells of a table in float32
 PIECE = 2**20  # pairs of a pixel and a row whose weights are added up together
 
 

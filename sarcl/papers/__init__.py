@@ -55,7 +55,7 @@ def open_lab(
     paper: Paper, device: DeviceChoice | None = None, quick: bool = False, folder: Path | None = None,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Any:  # fmt: skip
-    """What the sections of a paper share, with its OpenCL device opened.
+    """Lab that the sections of a paper share, with its OpenCL device opened.
 
     quick     less of it (`Paper.quick`)
     folder    where long runs are kept (`Paper.long`);  progress  called as progress(stage, done, total) by these

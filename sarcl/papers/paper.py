@@ -197,7 +197,7 @@ class Paper:
 
 
 def _conclusion(published: list[Row], others: list[Row]) -> list[Block]:
-    """How many rows agree: those of the paper, and those whose values it does not print."""
+    """Numbers of rows that agree: those of the paper, and those whose values it does not print."""
     different = [row for row in published if not row.holds]
     blocks = [
         heading("Conclusion"),

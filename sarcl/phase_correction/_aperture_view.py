@@ -17,7 +17,7 @@ from . import _bright_points, _phase_gradient, _phase_smoothing
 from ._bright_points import Beam
 from ._narrow_aperture import narrow_pulses
 
-TOLERANCE = 1e-2  # of images in which bright points are chosen
+TOLERANCE = 1e-2  # tolerance of images in which bright points are chosen
 LAGS = np.arange(-4, 5) / 2  # range cells from a point
 NO_LAG = np.zeros(1)
 WINDOW = 64.0  # Doppler cells about a point that sharpness is computed over, after the first passes

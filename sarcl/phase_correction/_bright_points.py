@@ -15,7 +15,7 @@ from ..numerics.pulse_geometry import half_path
 from ..opencl import fft
 
 CANDIDATES = 50_000  # brightest pixels from which points are chosen
-OVERSAMPLE = 8  # of profiles read linearly: an error of 0.6 %, different at each point
+OVERSAMPLE = 8  # oversampling of profiles read linearly: an error of 0.6 %, different at each point
 ROWS = 64  # rows whose profiles are made together: bounds the memory
 PAD = 2  # samples of a profile that repeat its other end
 VALUES = 2**15  # per array operation: they fit in a processor's cache

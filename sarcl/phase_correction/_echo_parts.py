@@ -8,7 +8,7 @@ from . import _bright_points, _phase_gradient
 from ._aperture_view import WINDOW, ApertureView
 from ._search import ENOUGH, GROWTH
 
-PASSES = 3  # of the estimate from given places
+PASSES = 3  # passes of the estimate from given places
 # of the power of the brightest place: side lobes in range, of a Hamming window over the band, are below (-43 dB)
 SIDE_LOBES = 1e-4
 BETWEEN = 2.0  # range cells of half the band behind the border of near and far places, which neither uses

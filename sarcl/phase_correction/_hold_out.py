@@ -28,11 +28,11 @@ AGREE = 0.4  # least closeness of two phases at which they agree; that of noise 
 # rather than risked: neighbouring points of the scene, which both halves of the band show, can gain as much by chance
 GAIN = 1.05
 KEPT = 0.95  # least change in sharpness, which is that of noise too, of the echoes without those of constant delay
-LOST = 0.5  # of its power, less than which a point must not keep: pixels beside its maximum show about as much
+LOST = 0.5  # share of its power that a point must keep: pixels beside its maximum show about as much
 APART = 0.5  # resolution cells: what moves bright places against one another by more must be known for certain
 SURE = 0.98  # agreement of the halves of the band from which on it is; 0.95 to 0.98 has been wrong by 1.4 cells
 COMMON = 0.35  # share of their pulses that neighbouring bright places must have in common for it
-SPANS = 16  # of the aperture: a slope of the phase over one of them moves points, one over a few pulses blurs them
+SPANS = 16  # spans of the aperture: a slope of the phase over one moves points, one over a few pulses blurs them
 IN_FOCUS = (
     "no phase sharpens echoes that it was not found from: the data are as well focused as these echoes can show; if "
     "the image is blurred, give a grid over its brightest isolated points"

@@ -18,7 +18,7 @@ MOVED = 0.05  # range cells: no range error changes by more
 GROWTH = 4  # a sub-aperture grows by a fourth of its length on each side
 LAST_PASSES = 3  # passes over the whole aperture, at most
 BANDS = 8, 4, 2, 1  # parts of the band: a range error of eight cells is one cell of an eighth of the band
-LEAST_SAMPLES = 8  # in a part of the band
+LEAST_SAMPLES = 8  # samples in a part of the band
 RANGE_MODES = 8  # cosines over the aperture for range errors, or an eighth of the pulses where that is fewer
 # Doppler cells between places where range errors are estimated. A target beside a place, in the window about it, moves
 # through range cells; where only places on one side see it, as at the edge of a grid, that looks like a range error

@@ -7,7 +7,7 @@ import numpy as np
 from . import _phase_gradient, _phase_smoothing
 
 MODES = 4, 8, 16, 32  # cosines over the aperture
-STEPS = 15  # of the ascent, for each number of cosines
+STEPS = 15  # steps of the ascent, for each number of cosines
 
 
 def curves(v: np.ndarray, free: np.ndarray, width: float) -> list[np.ndarray]:

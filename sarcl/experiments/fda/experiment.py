@@ -42,12 +42,12 @@ STEPS = 24  # samples of a cut per null of the conventional antenna
 DRAWN = 2000  # spatial frequencies that are kept, for plots
 RESOLVED = 3.0  # dB: least dip between two points that are resolved, and of other peaks below the lower of the two
 ALIKE = 0.2  # dB; dips that differ by less count as equal
-NEAR = 0.25  # of the null: distance from two points within which their peaks must lie
+NEAR = 0.25  # share of the null: distance from two points within which their peaks must lie
 WEAK = -6.0  # dB of a unit point in focus: a weaker peak is a side lobe, or of a smeared point
 
 
 class Pair(TypedDict):
-    """What a cut shows of two points: see `pair`."""
+    """Response of two points on a cut: see `pair`."""
 
     dip_db: float
     shift: float | None
@@ -197,12 +197,12 @@ def _crossing(x: np.ndarray, power: np.ndarray, i: int, side: int) -> float:
 
 
 def dip(at: np.ndarray, values: np.ndarray, separation: float) -> float:
-    """How far the image falls between two points, dB below the lower of their peaks; 0 where there is only one peak."""
+    """Fall of the image between two points, dB below the lower of their peaks; 0 where there is only one peak."""
     return float(pair(at, values, separation)["dip_db"])
 
 
 def pair(at: np.ndarray, values: np.ndarray, separation: float) -> Pair:
-    """What a cut, m (n,) and amplitudes of a unit point (n,), shows of two points `separation` m apart about 0.
+    """Response on a cut, m (n,) and amplitudes of a unit point (n,), of two points `separation` m apart about 0.
 
     dip_db    the `dip`, dB;  level_db  the lower of the two peaks, dB
     shift     larger distance of the two peaks from their points, m

@@ -1,4 +1,4 @@
-"""How the curvature of wavefronts differs over a tile and a group of pulses, for plans by lines of pixels."""
+"""Difference of the curvature of wavefronts over a tile and a group of pulses, for plans by lines of pixels."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ MOST_LOCAL = 48 * 1024  # bytes of local memory that any NVIDIA device gives to 
 
 @dataclass(frozen=True, eq=False)
 class SharedLinePlan(LinePlan):
-    """As LinePlan, for lines that a work-group shares.
+    """LinePlan of lines that a work-group shares.
 
     slopes  interpolator whose weights' slopes shift the positions of pixels; None: none do
     native  sine and cosine are the device's own

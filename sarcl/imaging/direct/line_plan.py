@@ -35,7 +35,7 @@ def components(beam: bool) -> int:
 
 @dataclass(frozen=True, eq=False)
 class LinePlan:
-    """How lines of pixels are computed.
+    """Plan of backprojection by lines of pixels.
 
     side            pixels along a side of a tile
     fine            samples of a line's profile per pixel
@@ -196,8 +196,8 @@ def series(tolerance: float, curvature: GroupCurvature, highest: float) -> tuple
 
 
 def profile_interpolator(error: float, n_samples: int, reads: float) -> tuple[Interpolator, int, float] | None:
-    """As interpolator_choice.choose_interpolator; None where none has so small an error: other lines may leave more to
-    the interpolator."""
+    """Result of interpolator_choice.choose_interpolator; None where none has so small an error: other lines may leave
+    more to the interpolator."""
     try:
         return interpolator_choice.choose_interpolator(error, n_samples, reads)
     except ToleranceUnreachable:

@@ -65,7 +65,7 @@ class Block(NamedTuple):
 
 @dataclass(frozen=True)
 class KernelForm:
-    """What kernels are built for: transmitter and receiver apart, profiles that repeat, profiles of each tile, a beam.
+    """Cases that kernels are built for: transmitter and receiver apart, profiles that repeat, or of each tile, a beam.
 
     weights  of pulses in the pixels: macros of kernels/pixel_weights.clh
     """

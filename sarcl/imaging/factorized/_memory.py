@@ -70,7 +70,7 @@ class MemoryPlan:
         return self.n_bytes(roots, pixels) + self.profiles.nbytes(rows) + 2 * min(AT_ONCE, nbytes / 8)
 
     def passes(self, nbytes: float) -> tuple[int, int]:
-        """How many parts all blocks have, and how many roots these parts have together."""
+        """Number of parts of all blocks, and of the roots of these parts together."""
         parts = [part for run in self.blocks(nbytes) for part in self.parts(*run, nbytes)]
         return len(parts), sum(self.tiling.part_size(part, self.plan.factors[0])[0] for part in parts)
 

@@ -15,7 +15,7 @@ MORE = 1.5  # rows added directly to a root, relative to those it needs: neighbo
 
 @dataclass(frozen=True, eq=False)
 class TileCoverage:
-    """What becomes of the pairs of rows and roots (the largest tiles).
+    """Rows by what becomes of them at each root (the largest tiles).
 
     merged    (n roots,) bool: roots into which rows are merged
     left_out  for each root: the rows that are not merged, bool (n_rows,), or None where all are

@@ -58,7 +58,7 @@ class Level:
 
 @dataclass(frozen=True, eq=False)
 class FactorPlan:
-    """How the factorised method makes an image: the levels from roots to leaves, and the step from leaves to pixels.
+    """Plan of an image by the factorised method: the levels from roots to leaves, and the step from leaves to pixels.
 
     factors  leaves along a side of a tile, for each level
     first    interpolator of the range profiles of the rows, `length` samples long; between: that between two levels

@@ -19,7 +19,7 @@ from ..tiling.tiling import FlatImage, Tiling, download_sums
 from ._pulse_records import packed
 from .plan import CHUNK, Float64Plan
 
-N_CONST = 16  # of kernels/geometry_float64.clh
+N_CONST = 16  # numbers per pair of tile and pulse: N_CONST of kernels/geometry_float64.clh
 PIXEL_BYTES = 56  # bytes per pixel: position, sum, and the compensation of the sum
 
 
@@ -135,7 +135,7 @@ def _no_float64(device: Device) -> str:
 
 
 def remedy() -> str:
-    """What to do on a device without float64."""
+    """Remedy on a device without float64."""
     able = [f"{i.index}: {i.name}" for i in devices() if i.works and i.fp64]
     return f"choose device= one of {'; '.join(able)}" if able else "no device here has float64"
 

@@ -26,7 +26,7 @@ WIDE = -1  # order of plans that compute every path in pairs of float64
 
 @dataclass(frozen=True, eq=False)
 class Float64Plan:
-    """How an image is computed in float64.
+    """Plan of an image in float64.
 
     length        samples of a range profile
     per_tile      pixels of a tile

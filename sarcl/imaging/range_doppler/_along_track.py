@@ -16,7 +16,7 @@ from ._host_rows import ARRAYS, Budget
 from ._plan import FocusPlan
 
 PIECE = 64  # columns that are transformed at a time, for the cache
-TERMS = 1024  # of a sum in complex64, before it is added to a total in complex128
+TERMS = 1024  # terms of a sum in complex64, before it is added to a total in complex128
 
 
 class Spectra:

@@ -22,7 +22,7 @@ LEAST_ZONES = 1.5  # Fresnel zones, smallest width of B
 INWARDS = 1 / 8, 3 / 16, 1 / 4, 5 / 16, 3 / 8, 7 / 16, 1 / 2
 OUTSIDE = 4e-3
 FINE, FINEST = 32, 2048  # least cells of the table per Fresnel zone, and in the beam
-FAINTEST = 1e-9  # of the largest weight: smaller ones are rounding of an FFT
+FAINTEST = 1e-9  # share of the largest weight: smaller ones are rounding of an FFT
 MARGIN = 12.0  # Fresnel zones beside the beam in which the stationary phase is compared: it spreads by a few
 
 

@@ -1,4 +1,4 @@
-"""Which zero-Doppler times and slant ranges an image has, and the Doppler band that it needs."""
+"""Zero-Doppler times and slant ranges of an image, and the Doppler band that it needs."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from ._range_window import RangeWindow
 from ._track import REMEDY, Track
 from ._velocity import Positions
 
-FILLED = 0.8  # of the sampling rate along rows and columns that the spectrum of a pixel fills, by default
-HELD = 0.6  # of the slant ranges that the range window holds at one time: default times leave as many
+FILLED = 0.8  # share of the sampling rate along rows and columns that the spectrum of a pixel fills, by default
+HELD = 0.6  # share of the slant ranges in the range window at one time that default times leave
 MOST_PIXELS = 2**31
 PIXEL_BYTES = 8 + 2 * 24  # a pixel, and its position while a grid is made
 
@@ -165,7 +165,7 @@ def _sines_used(sight: _Sight, corners: np.ndarray, times: np.ndarray) -> tuple[
 
 @dataclass(frozen=True, eq=False)
 class _Sight:
-    """How rows see points: about the Doppler centroid, a sine, within a beam, rad, or wherever (None).
+    """View of points from the rows: about the Doppler centroid, a sine, within a beam, rad, or wherever (None).
 
     speed      effective velocity, m/s: Doppler frequencies are 2 f speed/c times the sines of this file. Those of the
                antenna's angles are speed/track.speed times as large, since its own speed makes the same frequencies

@@ -31,7 +31,7 @@ from ._plan import SEGMENT, FocusPlan
 if TYPE_CHECKING:
     from ...opencl.device import Buffer
 
-LENGTHS = 3  # of FFTs: along the track, of range profiles, back; the programs of each keep what they take
+LENGTHS = 3  # lengths of FFTs: along the track, of range profiles, back; the programs of each keep their memory
 WORK = 1 / 16  # share of a budget for the rows that are transformed at a time, with one of these lengths
 UPLOAD = 2**26  # bytes of samples that are uploaded at a time
 PIECE = 64  # rows that the host refers to one range at a time
@@ -79,7 +79,7 @@ def focus_on_device(job: Job, clock: Clock, on_progress: Callable[[float], None]
 
 @dataclass(frozen=True)
 class Room:
-    """What fits on a device.
+    """Arrays and blocks that fit on a device.
 
     spectra, folded  whether the rows and their spectra stay there, and the compressed Doppler bins
     work     bytes for the rows of a transform;  left  for blocks of all else;  bins  Doppler bins at a time

@@ -18,7 +18,7 @@ from ...earth.elevation import ElevationModel
 from ._track import REMEDY, Track
 
 UP = np.array([0.0, 0.0, 1.0])
-HIGHEST = 1e8  # m, of heights above the ellipsoid, or above the plane z = 0
+HIGHEST = 1e8  # m, largest height above the ellipsoid, or above the plane z = 0
 NODES = 10, 24  # times and ranges at which smooth Earth-fixed positions are solved; in between, Chebyshev polynomials
 
 

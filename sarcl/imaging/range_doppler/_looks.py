@@ -22,7 +22,7 @@ from ._plan import FocusPlan, make_plan
 from ._track import Track
 from ._velocity import Hyperbolas
 
-TOLERANCE = 0.1  # of the looks: the displacement of intensities does not need more
+TOLERANCE = 0.1  # tolerance of the looks: the displacement of intensities does not need more
 MOST_PIXELS = 2048, 512  # rows and columns of the looks, from the middle of the image
 
 

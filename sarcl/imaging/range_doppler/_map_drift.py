@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import optimize
 
-BLOCKS = 8  # of slant ranges
+BLOCKS = 8  # blocks of slant ranges
 FINER = 4  # points per row at which correlations are tabulated
 FACTORS = 0.8, 1.25  # smallest and largest v^2/v0^2
 ENOUGH = 6.0  # least peak of the correlation over the median at all lags, in median absolute deviations

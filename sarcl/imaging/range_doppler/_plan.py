@@ -34,7 +34,7 @@ CUBIC = 1 / 24  # largest error of a cubic through four nodes, in the first inte
 
 @dataclass(frozen=True, eq=False)
 class FocusPlan:
-    """How an image is made.
+    """Plan of an image.
 
     times, ranges   zero-Doppler times of the rows, s, and slant ranges of the columns, m; times lie step/finer apart
     band            Doppler band, as sines of squint angles

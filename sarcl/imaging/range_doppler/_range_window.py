@@ -1,4 +1,4 @@
-"""Which slant ranges lie in the range window of every row that contributes to them."""
+"""Slant ranges that lie in the range window of every row that contributes to them."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ EDGES = 0.25  # share of the tolerance for the ends of the Doppler band
 
 @dataclass(frozen=True, eq=False)
 class RangeDopplerTask:
-    """What is to be focused, and how.
+    """One image to be focused, with its plan.
 
     sample_weight, row_weight   of samples (n_samples,) and rows (n_rows,);  budget  bytes
     speed      effective velocity, m/s, to which the centroids refer;  wavelength  of sample n_samples//2, m
@@ -61,7 +61,7 @@ class RangeDopplerTask:
 
     @property
     def beyond_beam(self) -> float:
-        """What a point in the middle of the image lacks, dB, if no echo of it comes from beyond the beam; 0 or less.
+        """Level that a point in the middle of the image has, dB, if no echo comes from beyond the beam; 0 or less.
 
         The tapers of a beam without a window lie beyond it, and rows there count in the gain.
         """

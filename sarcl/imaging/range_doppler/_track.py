@@ -11,8 +11,8 @@ from ...base import wgs84
 from ...base.constants import SPEED_OF_LIGHT
 from ...model.phase_history import PhaseHistory
 
-EVEN = 1e-3  # of a pulse interval: largest deviation of pulse times from even spacing
-FINEST = 1e-3  # of the pulse interval: coarsest resolution of times
+EVEN = 1e-3  # pulse intervals, largest deviation of pulse times from even spacing
+FINEST = 1e-3  # pulse intervals, coarsest resolution of times
 DEGREES = 7  # highest degree of the polynomials of time through the positions
 UP = np.array([0.0, 0.0, 1.0])
 REMEDY = "use backproject, which takes any track"

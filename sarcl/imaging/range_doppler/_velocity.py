@@ -18,7 +18,7 @@ from ...model.phase_history import PhaseHistory
 from ._track import Track
 
 RANGES = 7  # slant ranges at which hyperbolas are fitted
-DEGREE = 4  # of the polynomials of range through their parameters
+DEGREE = 4  # degree of the polynomials of range through their parameters
 MOST_FACTOR = 4.0  # largest ratio of the squares of velocities for a Doppler rate that is given and the geometry's
 MOST_ROWS = 129  # rows from which they are fitted, and their error is measured
 Positions = Callable[[np.ndarray, np.ndarray], np.ndarray]  # m (n, m, 3) of times (n,) and ranges (m,)

@@ -1,4 +1,4 @@
-"""Which device makes which bands of an image: each takes what it can make until all end together."""
+"""Division of the bands of an image among devices: each takes what it can make until all end together."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from collections.abc import Callable, Sequence
 
 from ..tiling.tiling import Run, Tiling
 
-SURE = 0.75  # of a share is taken at a time by a device whose speed is known: the rest corrects the division
+SURE = 0.75  # part of its share that a device of known speed takes at a time: the rest corrects the division
 UNSURE = 0.25  # the same for one whose speed was measured with another kernel
-WORTH = 0.25  # of an engine's `least_pixels`: what is left over after UNSURE must be this much to be divided again
-LITTLE = 0.05  # of its share, by which a device may take more to end at a whole band
+WORTH = 0.25  # part of an engine's `least_pixels` that must be left over after UNSURE to be divided again
+LITTLE = 0.05  # part of its share by which a device may take more, to end at a whole band
 
 
 class Shares:

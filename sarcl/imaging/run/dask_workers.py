@@ -43,7 +43,7 @@ BLOCKS_EACH = 4  # blocks per worker, so that no worker waits long for the slowe
 
 @dataclass(frozen=True, eq=False)
 class WorkerTask:
-    """What every worker receives once: the task, the plan, the choice of its device, and the memory it may use
+    """Data that every worker receives once: the task, the plan, the choice of its device, and the memory it may use
     there."""
 
     task: FocusingTask
@@ -120,7 +120,7 @@ def _losses() -> tuple[type[BaseException], ...]:
 
 
 def device_class(client: Client, device: Devices) -> DeviceClass:
-    """What plans must know of the devices of all workers together. Opens the devices.
+    """Class of the devices of all workers together, for plans. Opens the devices.
 
     ImportError without dask, TypeError for another kind of client, RuntimeError where it has no workers.
     """

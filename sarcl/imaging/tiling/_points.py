@@ -23,7 +23,7 @@ KEPT = 2**25  # points of a grid whose order is kept, in 4 bytes each
 
 
 class _Curve:
-    """What the tilings of one grid share.
+    """Orders and radii that the tilings of one grid share.
 
     orders  {band: order of its cells that are not empty, int32, along a space-filling curve}
     radii   {side: the largest radius of a tile, m}
@@ -70,7 +70,7 @@ class PointTiling(Tiling):
         return sum(self._padded(b) for b in range(first, last))
 
     def _empty_in(self, band: int) -> np.ndarray | None:
-        """Which cells of a band are empty, (n,) bool; None: no cell of the grid is."""
+        """Mask of the empty cells of a band, (n,) bool; None: no cell of the grid is."""
         return None if self.empty is None else self.empty[self.extent(band, band + 1)]
 
     def _cells(self, band: int) -> int:

@@ -1,4 +1,4 @@
-"""What every tiling offers: bands of tiles, and parts and sections of them for factorised backprojection."""
+"""Base class of tilings: bands of tiles, and parts and sections of them for factorised backprojection."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class FlatImage(Protocol):
 
 
 class Part(NamedTuple):
-    """What the factorised method makes at a time of bands first ... last - 1.
+    """Part of bands first ... last - 1 that the factorised method makes at a time.
 
     low, high  of a plane: leaves low ... high - 1 across; of listed points: roots low ... high - 1 of these bands
     """
@@ -104,7 +104,7 @@ class Tiling(ABC):
 
     @abstractmethod
     def extent(self, first: int, last: int) -> slice:
-        """Where bands first ... last - 1 lie in the flat image (rows of a plane, or points)."""
+        """Place of bands first ... last - 1 in the flat image (rows of a plane, or points)."""
 
     @abstractmethod
     def pixels(self, first: int, last: int) -> int:

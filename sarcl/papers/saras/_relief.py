@@ -49,7 +49,7 @@ def parallelepiped(lab: Lab) -> Section:
 def _edges(
     out: Section, lab: Lab, raw: PhaseHistory, ends: tuple[float, float], half: tuple[float, float, float]
 ) -> None:
-    """Where layover begins, and where the dark run begins and ends, on the ground and along slant range."""
+    """Begin of layover, begin and end of the dark run, on the ground and along slant range."""
     depth, width, height = half
     front = -depth - height * COTANGENT
     for plane in ("ground", "slant"):

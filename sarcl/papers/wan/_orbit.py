@@ -161,7 +161,7 @@ def _scene(axes: np.ndarray, origin: np.ndarray, seed: int) -> Scene:
 
 
 def _shadow(out: Section, power: np.ndarray, grid: ImageGrid, tangent: float) -> None:
-    """Where the shadow of the cylinder ends behind the frustum."""
+    """End of the cylinder's shadow behind the frustum."""
     assert grid.spacing is not None
     x = (np.arange(grid.shape[1]) - grid.shape[1] // 2) * grid.spacing[1]
     y = (np.arange(grid.shape[0]) - grid.shape[0] // 2) * grid.spacing[0]

@@ -87,7 +87,7 @@ class Record:
 
 
 def received(raw: PhaseHistory, rate: float = SAMPLING, carrier: float = CENTER) -> Record:
-    """What a receiver samples of the echoes of `CHIRP`, from the compressed echoes: the pulse is put back.
+    """Samples that a receiver takes of the echoes of `CHIRP`, from the compressed echoes: the pulse is put back.
 
     One window of time for all pulses, whatever their range; carrier 0: the field itself, its imaginary part being its
     Hilbert transform.
