@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 from ..tiling.tiling import Run, Tiling
 
@@ -12,6 +13,17 @@ SURE = 0.75  # part of its share that a device of known speed takes at a time: t
 UNSURE = 0.25  # the same for one whose speed was measured with another kernel
 WORTH = 0.25  # part of an engine's `least_pixels` that must be left over after UNSURE to be divided again
 LITTLE = 0.05  # part of its share by which a device may take more, to end at a whole band
+
+
+class Worker(NamedTuple):
+    """A device: bands that its blocks may not cross, Engine.least_pixels, and its speed relative to the others'.
+
+    Equal speeds are taken for certain.
+    """
+
+    ends: set[int]
+    least: float
+    rate: float
 
 
 class Shares:
@@ -27,21 +39,16 @@ class Shares:
         self,
         tiling: Tiling,
         todo: list[Run],
+        devices: Sequence[Worker],
         *,
         most: float,
         unit: int,
-        ends: Sequence[set[int]],
-        least: Sequence[float],
-        rates: Sequence[float],
         now: Callable[[], float] = time.monotonic,
     ) -> None:
-        """most    pixels of a block, at most;  unit  blocks begin at multiples of so many bands if possible
-        ends    for each device: bands that its blocks may not cross
-        least   for each device: Engine.least_pixels
-        rates   for each device: its speed, relative to that of the others; equal ones are taken for certain
-        """
-        self.tiling, self.most, self.unit, self.ends, self.least = tiling, most, unit, ends, least
-        self._left, self._rates, self._now = list(todo), list(rates), now
+        """most  pixels of a block, at most;  unit  blocks begin at multiples of so many bands if possible"""
+        self.tiling, self.most, self.unit, self.devices = tiling, most, unit, devices
+        rates = [device.rate for device in devices]
+        self._left, self._rates, self._now = list(todo), rates, now
         self._alike = min(rates) == max(rates)
         self._taken, self._done, self._busy = ([0.0] * len(rates) for _ in range(3))  # pixels, pixels, s
         self._began: list[float | None] = [None] * len(rates)
@@ -111,13 +118,13 @@ class Shares:
         share = min(speeds[k] * end, remainder)
         sure = self._alike or self._done[k] > 0
         rest = share * (1 - (SURE if sure else UNSURE))
-        worth = self.least[k] if sure else WORTH * self.least[k]
+        worth = self.devices[k].least if sure else WORTH * self.devices[k].least
         return share - rest if rest >= worth and len(free) > 1 else share
 
     def _block(self, k: int, pixels: float) -> Run | None:
         """About so many pixels from the first band on that is left, or None where that is less than half a block."""
         first, stop = self._left[0]
-        stop = min([e for e in self.ends[k] if e > first] + [stop])
+        stop = min([e for e in self.devices[k].ends if e > first] + [stop])
         size, count = min(pixels, self.most), self.tiling.count
         last = stop
         if count(first, stop) > size:

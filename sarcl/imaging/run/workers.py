@@ -14,7 +14,7 @@ from ...base.stage_timer import Clock
 from ...opencl.failures import DeviceFailed
 from ..engine import Engine, Skipped
 from ..tiling.tiling import FlatImage, Run, Tiling
-from ._shares import Shares
+from ._shares import Shares, Worker
 
 log = logging.getLogger(__name__)
 
@@ -94,8 +94,9 @@ class LocalWorkers:
         ends = [{last for _, last in engine.blocks(budget)} for engine, budget in each]
         tiling = self.engines[0].tiling
         if self.size > 1:
-            least = [float(engine.least_pixels) for engine in self.engines]
-            shares = Shares(tiling, work.todo, most=work.most, unit=work.unit, ends=ends, least=least, rates=self.rates)
+            least = [engine.least_pixels for engine in self.engines]
+            devices = [Worker(*each) for each in zip(ends, least, self.rates, strict=True)]
+            shares = Shares(tiling, work.todo, devices, most=work.most, unit=work.unit)
             yield from self._together(shares, work)
             return
         before = 0
