@@ -43,8 +43,10 @@ def section(lab: Lab) -> Section:
     for figure, (way, response) in zip(("2.15", "2.16"), curves.items(), strict=True):
         out.plot(
             [(name, places, values / values.max()) for name, (places, values) in response.items()],
-            f"{way}, m", "modulus", f"Cut through the centre point along {way} (figure {figure}).",
-        )  # fmt: skip
+            f"{way}, m",
+            "modulus",
+            f"Cut through the centre point along {way} (figure {figure}).",
+        )
         out.keep(**{f"{way} {name}": {"m": places[::4], "modulus": v[::4]} for name, (places, v) in response.items()})
     return out
 

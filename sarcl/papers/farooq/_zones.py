@@ -109,10 +109,12 @@ def _sweeps(out: Section, radar: RangeZones, lab: Lab) -> None:
         error = float(np.abs(np.array(measured) - same)[clear].max())
         out.keep(**{name: {"at": x, "measured_db": measured, "predicted_db": same, "largest_error_db": error}})
         out.plot(
-            [("predicted", xs, np.maximum(predicted, FLOOR)), ("measured", x, np.maximum(measured, FLOOR))], axis, "dB",
+            [("predicted", xs, np.maximum(predicted, FLOOR)), ("measured", x, np.maximum(measured, FLOOR))],
+            axis,
+            "dB",
             f"The next zone's point in zone 0's image, against {name}; largest difference {error:.2f} dB.",
             dots=("measured",),
-        )  # fmt: skip
+        )
 
 
 def _image(

@@ -65,11 +65,13 @@ def section(lab: Lab) -> Section:
         # The intensities of Rayleigh amplitudes are exponential: n of them have a contrast of 1 +- 1/sqrt(n)
         sigmas = float((statistics.contrast - 1) * np.sqrt(len(amplitude)))
         rejected = [
-            text for text, is_rejected in (
+            text
+            for text, is_rejected in (
                 (f"its contrast, {abs(sigmas):.0f} standard errors from 1", abs(sigmas) > STANDARD_ERRORS),
                 (f"the {TEST}", statistics.rayleigh <= SIGNIFICANT),
-            ) if is_rejected
-        ]  # fmt: skip
+            )
+            if is_rejected
+        ]
         verdict = f"Rayleigh rejected by {' and by '.join(rejected)}" if rejected else "Rayleigh not rejected"
         out.states(
             f"case {name}, {case.words}: grey levels",
@@ -85,10 +87,12 @@ def section(lab: Lab) -> Section:
         out.draw(picture(clean, grid, f"Figure 12 {name}: {case.words}. Hamming window.", -25.0))
         out.plot(
             [(f"case {name}", bins, density), ("Rayleigh", bins, rayleigh(bins))],
-            "amplitude over its root mean square", "density",
+            "amplitude over its root mean square",
+            "density",
             f"Grey levels of the lower left patch in case {name} (histogram of figure 12 {name}), "
-            f"{len(amplitude)} pixels, without a window.", dots=[f"case {name}"],
-        )  # fmt: skip
+            f"{len(amplitude)} pixels, without a window.",
+            dots=[f"case {name}"],
+        )
     out.say(
         "Patches differ in permittivity (1 to 40) and conductivity (1e-4 to 1 S/m); the paper gives the ranges alone. "
         "The patch of permittivity 1 reflects nothing and is black. Facets per resolution cell: 4 x 4, in case c 16 "

@@ -77,10 +77,12 @@ def _edges(
             start = crossings(profile[near], places[near], (before + over) / 2)[1]
             out.number("layover begins", FIGURE, front, start, FINE.null[1], "m", ".2f", basis="geometry")
             out.plot(
-                [("mean over azimuth", places, 10 * np.log10(profile / lit))], "ground range, m", "dB over the ground",
+                [("mean over azimuth", places, 10 * np.log10(profile / lit))],
+                "ground range, m",
+                "dB over the ground",
                 "Profile across the parallelepiped, mean over azimuth: layover, then shadow, which the side lobes of a "
                 "Hamming window fill to about -33 dB.",
-            )  # fmt: skip
+            )
     out.say(
         f"The paper gives no dimensions. The solid is {2 * depth:g} m deep, {2 * width:g} m wide and {height:g} m high "
         f"here, seen {np.degrees(FINE.look):.0f} deg off the vertical, and the values marked geometry follow from "

@@ -118,8 +118,10 @@ def _correlations(out: Section, lab: Lab, radar: FarRadar, raw: PhaseHistory, n:
     out.states(item, "figure 7", "coincident", f"differ by up to {off:.3f}", off < 0.05, value=off, rule=rule)
     out.plot(
         [("autocorrelation of the image", lags / FINE, curve), ("response of a point", lags / FINE, response)],
-        "distance in range, nulls", "modulus", "Range section of the image's autocorrelation (figure 7).",
-    )  # fmt: skip
+        "distance in range, nulls",
+        "modulus",
+        "Range section of the image's autocorrelation (figure 7).",
+    )
     out.keep(table=table, pixel_in_nulls=size, curve=curve, response=response)
 
 

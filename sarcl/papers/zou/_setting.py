@@ -110,4 +110,4 @@ def _table(out: Section, lab: Lab) -> None:
         f"{FULL_BYTES / 1e9:g} GB for a run, forecast for this machine at its present speed "
         "(sarcl.plan). Figure 8 takes 18 runs more for cuboid and "
         "sharp cone each.",
-    )  # fmt: skip
+    )

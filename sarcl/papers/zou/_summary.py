@@ -50,12 +50,14 @@ def section(lab: Lab) -> Section:
     reports = [report_of(lab.full_wave(name))[0] for name in edged]
     uncertain = np.array([(report.predicted_error or 0.0) + (report.model_error or 0.0) for report in reports])
     out.states(
-        "physical optics against full wave, targets with edges", "abstract",
+        "physical optics against full wave, targets with edges",
+        "abstract",
         "imprecise for fine structures at low frequencies",
         ", ".join(f"{name} {d:.0%} (full wave {u:.0%})" for name, d, u in zip(edged, differ, uncertain, strict=True)),
-        (differ > uncertain).all(), value=differ,
+        (differ > uncertain).all(),
+        value=differ,
         rule="difference of the echoes above the predicted error of full wave, for each of them",
-    )  # fmt: skip
+    )
     out.keep(cross_over_co_db=cross, optics_differs={name: level.apart for name, level in lab.levels.items()})
     return out
 
