@@ -100,13 +100,13 @@ def section(result: Result, level: int = 2) -> list[Block]:
             "Points elsewhere, each focused alone.",
         ))  # fmt: skip
     head = ["mapping", *(f"{s:g} m apart" for s in separations)]
-    dips = [[name, *(_dip(d, result["resolved_if"]["shift"]) for d in row["dips"])] for name, row in rows.items()]
+    cells = [[name, *(_dip(d, result["resolved_if"]["shift"]) for d in row["dips"])] for name, row in rows.items()]
     caption = (
         "Two equal points in phase about the centre: dip between their peaks, dB, and whether they are resolved; where "
         "the dip alone would resolve them, the number of peaks, or their largest error of position, or their level. "
         f"Resolved here: {rule(result['null'])}."
     )
-    blocks.append(table(head, dips, caption))
+    blocks.append(table(head, cells, caption))
     return blocks
 
 
