@@ -113,7 +113,7 @@ def make_plan(task: FocusingTask, tolerance: float, on: DeviceClass = CPU) -> tu
                 return plan
             reason = plan
         if not tried and not reason:
-            reason = case.untried()
+            reason = case.obstacle()
     raise ToleranceUnreachable(tolerance, None, reason, how=f"with sub-apertures here: {reason}")
 
 
@@ -172,7 +172,7 @@ class _Case:
                     if estimate:
                         yield _Candidate(chain, taps, spacing, filter_taps, fine, share, *estimate)
 
-    def untried(self) -> str:
+    def obstacle(self) -> str:
         """The reason why there is no candidate at all."""
         share = MERGING_SHARE * self.tolerance / 3  # of a tree of one level, which has the fewest errors
         fine = [s for s in (_spacing(filter_taps, share) for filter_taps in TAPS) if s is not None]
