@@ -145,7 +145,7 @@ class Paper:
     main: tuple[str, ...] = ()
     long: bool = False
 
-    def run(self, lab: Any) -> Iterator[Section]:
+    def run(self, lab: object) -> Iterator[Section]:
         """Its sections, one after the other, timed; lab: as `self.lab` makes it."""
         for make in self.sections:
             start = time.monotonic()

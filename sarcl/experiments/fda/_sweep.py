@@ -8,6 +8,7 @@ from math import prod
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ...base import text, validation
 from .case import Case
@@ -66,7 +67,7 @@ def cases(fields: Mapping[str, Any], values: Mapping[str, Any]) -> list[Case]:
     return out
 
 
-def shown(name: str, value: Any) -> str:
+def shown(name: str, value: ArrayLike | None) -> str:
     """A value with its unit as text, or a word."""
     unit, scale = UNITS.get(name, ("", 1.0))
     if value is None or isinstance(value, (bool, str)):

@@ -70,11 +70,11 @@ def _plain(table: dict[str, Any], known: tuple[str, ...], where: str) -> dict[st
     return out
 
 
-def _tuples(value: Any) -> Any:
+def _tuples(value: object) -> object:
     return tuple(_tuples(v) for v in value) if isinstance(value, list) else value
 
 
-def _radians(key: str, value: Any, where: str) -> Any:
+def _radians(key: str, value: object, where: str) -> float | tuple[float, ...]:
     try:
         angles = [float(np.deg2rad(validation.number(key, v))) for v in (value if isinstance(value, list) else [value])]
     except ValueError as exc:

@@ -95,7 +95,7 @@ def _table(out: Section, lab: Lab) -> None:
         scene, needs = lab.scene(target.name), lab.forecast(target.name)
         size = np.diff(scene.bounds, axis=0)[0]
         sizes.append([target.name, target.printed, " x ".join(f"{v:.3g}" for v in size), len(scene.triangles)])
-        plan: Any = needs.plan
+        plan: dict[str, Any] = dict(needs.plan)
         full.append([
             target.name, plan["grid"], plan["steps"], f"{plan['run_bytes'] / 2**30:.1f}", plan["runs"],
             f"{plan['run_seconds'] / 60:.0f}", f"{needs.seconds / 3600:.1f}",
