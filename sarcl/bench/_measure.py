@@ -87,14 +87,7 @@ def _spent(row: Row, share: float, repeats: int, limit: float) -> bool:
     return len(runs) >= repeats or (bool(runs) and (sum(runs) + min(runs)) * share > limit)
 
 
-def _take(
-    row: Row,
-    competitor: Competitor,
-    case: BenchCase,
-    limit: float,
-    paces: Paces,
-    warm: bool,
-) -> None:
+def _take(row: Row, competitor: Competitor, case: BenchCase, limit: float, paces: Paces, warm: bool) -> None:
     """Run once and record it in the row."""
     expected = case.pairs * paces.get(_key(row), 0.0)
     if warm and expected > limit:
@@ -127,8 +120,8 @@ def _judge(row: Row, competitor: Competitor, case: BenchCase, reading: Reading) 
     if competitor.check is None:
         row["error"], row["error_of_image"] = case.errors(reading.values)
     else:
-        wanted, norm = competitor.check
-        wrong, own = float(np.linalg.norm(reading.values - wanted)), float(np.linalg.norm(wanted))
+        exact, norm = competitor.check
+        wrong, own = float(np.linalg.norm(reading.values - exact)), float(np.linalg.norm(exact))
         row["error"], row["error_of_image"] = wrong / max(own, norm), wrong / own
     if not np.isfinite(row["error"]):
         raise Absent("its image holds NaN or Inf")

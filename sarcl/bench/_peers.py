@@ -43,12 +43,12 @@ def check_python(path: str | None) -> str:
 
     if path is None:
         return sys.executable
-    found = shutil.which(path)
-    if found is None:
+    program = shutil.which(path)
+    if program is None:
         raise ValueError(
             f"--peer-python {path!r} is no program; give the path of a Python that has the peer, such as env/bin/python"
         )
-    return found
+    return program
 
 
 class Peer:
@@ -65,7 +65,7 @@ class Peer:
     def __enter__(self) -> Peer:
         return self
 
-    def __exit__(self, *_: Any) -> None:
+    def __exit__(self, *_: object) -> None:
         self._stop()
 
     def load(self, folder: Path) -> None:
@@ -153,23 +153,23 @@ class Peer:
                 self.process.kill()
             code = self.process.wait()
             self.stderr.seek(0)
-            said = " ".join((line + self.stderr.read()).split())[-400:] or "nothing said"
-            raise Absent(f"{Path(self.command[0]).name} ended with {code}: {said}") from None
+            reply = " ".join((line + self.stderr.read()).split())[-400:] or "nothing said"
+            raise Absent(f"{Path(self.command[0]).name} ended with {code}: {reply}") from None
 
 
 def competitors(case: BenchCase, peer: Peer, methods: Sequence[str], backend: str = "cpu") -> list[Competitor]:
     """fastsar's formers with the settings above; `peer` has the case loaded."""
-    found = []
+    others = []
     if "direct" in methods:
         for interp, upsample in EXACT:
             spec = {"former": "exact", "options": {"interp": interp, "upsample": upsample, "backend": backend}}
-            found.append(_competitor(peer, "direct", f"{interp}, {upsample} x", spec, backend))
+            others.append(_competitor(peer, "direct", f"{interp}, {upsample} x", spec, backend))
     if "factorized" in methods:
         for options in FACTORIZED:
             spec = {"former": "factorized", "options": {**options, "backend": backend}}
             words = ", ".join(f"{k} {v}" for k, v in options.items()) or "default"
-            found.append(_competitor(peer, "factorized", words, spec, backend))
-    return found
+            others.append(_competitor(peer, "factorized", words, spec, backend))
+    return others
 
 
 def _competitor(peer: Peer, method: str, setting: str, spec: dict[str, Any], backend: str) -> Competitor:

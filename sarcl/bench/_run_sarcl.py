@@ -48,7 +48,7 @@ def _competitor(case: BenchCase, folder: Path, device: Device, method: str, tole
         start, busy = time.perf_counter(), time.process_time()
         image = backproject(
             case.raw, case.grid, tolerance=tolerance, method=cast(Any, method), device=device, check=False
-        )  # fmt: skip
+        )
         call, busy = time.perf_counter() - start, time.process_time() - busy
         report = image.report
         assert report is not None  # backproject always gives one
@@ -68,12 +68,7 @@ def _competitor(case: BenchCase, folder: Path, device: Device, method: str, tole
         return Reading(image.data[case.at[0], case.at[1]], seconds, notes)
 
     def process() -> float:
-        options = {
-            "tolerance": tolerance,
-            "method": method,
-            "device": device.info.index,
-            "fp64": device.info.fp64,
-        }
+        options = {"tolerance": tolerance, "method": method, "device": device.info.index, "fp64": device.info.fp64}
         command = [sys.executable, "-m", "sarcl.bench.one_shot", str(folder), json.dumps(options)]
         start = time.perf_counter()
         done = subprocess.run(command, capture_output=True, text=True)

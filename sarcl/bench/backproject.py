@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import os
 import platform
 import tempfile
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -25,8 +27,18 @@ from ._competitor import Absent
 from ._measure import Paces, alternate, measure
 
 TOLERANCES = (1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 1e-5, 1e-6)
-FORMAT = 2  # of the document
+FORMAT = 2  # version of the document
 Document = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class _Effort:
+    """Runs of each row, pixels checked, and seconds: the longest run, and the wait until no other program runs."""
+
+    repeats: int
+    pixels: int
+    limit: float
+    patience: float
 
 
 def run(
@@ -65,25 +77,22 @@ def run(
         choice("scene", scene, _cases.SCENES)
     for method in methods:
         choice("method", method, METHODS)
-    wanted = [number(f"tolerances[{i}]", t, above=0) for i, t in enumerate(tolerances)]
+    errors = [number(f"tolerances[{i}]", t, above=0) for i, t in enumerate(tolerances)]
     sizes = sorted({count(f"sizes[{i}]", n, least=8) for i, n in enumerate(sizes)})
-    repeats, pixels = count("repeats", repeats), count("pixels", pixels, least=256)
-    limit, patience = number("limit", limit, above=0), number("patience", patience, least=0)
+    effort = _Effort(
+        count("repeats", repeats),
+        count("pixels", pixels, least=256),
+        number("limit", limit, above=0),
+        number("patience", patience, least=0),
+    )
     python = _peers.check_python(peer_python)
-    opened = [open_device(d) for d in _listed(devices)]
-    twins = [d.without_fp64() for d in opened if no_fp64 and d.info.fp64]
-    opened += twins
-
+    opened = _opened_devices(devices, no_fp64)
     document: Document = {**header(opened), "cases": []}
     with ExitStack() as stack:
         peer = None
         if with_peers:
-            try:
-                peer = stack.enter_context(_peers.Peer(python))
-                found = {"version": peer.version, "python": peer.python, "backend": peer_backend}
-            except Absent as exc:
-                found = {"absent": f"{exc}; --peer-python PATH names a Python that has it"}
-            document["peers"].append({"name": "fastsar", **found})
+            peer, description = _opened_peer(stack, python, peer_backend)
+            document["peers"].append(description)
         for line in tables.machine_text(document):
             say(line)
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="sarcl-bench-")))
@@ -91,65 +100,79 @@ def run(
             paces: Paces = {}
             for n in sizes:
                 progress("data", 0, 1)
-                case = _cases.make(scene, n, data, pixels)
+                case = _cases.make(scene, n, data, effort.pixels)
                 _cases.save(case, folder)
                 progress("data", 1, 1)
-                lines = _run_sarcl.competitors(case, folder, opened, methods, wanted)
+                lines = _run_sarcl.competitors(case, folder, opened, methods, errors)
                 others = _others(case, folder, peer, peer_backend, methods) if with_peers else []
-                rows = measure(
-                    case,
-                    alternate(lines, others),
-                    repeats=repeats,
-                    limit=limit,
-                    paces=paces,
-                    patience=patience,
-                    tick=lambda done, total: progress("bench", done, total),
-                )
-                result = {
-                    "scene": scene,
-                    "data": case.data,
-                    "n": n,
-                    "pairs": case.pairs,
-                    "pixels": pixels,
-                    "norm": float(np.linalg.norm(case.wanted)) / case.norm,
-                    "rows": rows,
-                }
+                result = _result(case, alternate(lines, others), effort, paces, functools.partial(progress, "bench"))
                 document["cases"].append(result)
                 document["machine"]["load"] = [document["machine"]["load"][0], *load()]
                 keep(document)
                 say("\n" + tables.text(result))
-    growth = tables.growth_text(document["cases"])
-    if growth:
-        say("\n" + growth)
-    say("\n" + tables.EXPLAINED)
+    for paragraph in filter(None, (tables.growth_text(document["cases"]), tables.EXPLAINED)):
+        say("\n" + paragraph)
     return document
+
+
+def _result(
+    case: _cases.BenchCase,
+    competitors: list[_competitor.Competitor],
+    effort: _Effort,
+    paces: Paces,
+    tick: Callable[[int, int], None],
+) -> dict[str, Any]:
+    """The entry of a case in the document, measured."""
+    rows = measure(
+        case,
+        competitors,
+        repeats=effort.repeats,
+        limit=effort.limit,
+        paces=paces,
+        patience=effort.patience,
+        tick=tick,
+    )
+    norm = float(np.linalg.norm(case.wanted)) / case.norm
+    setting = {"scene": case.scene, "data": case.data, "n": case.n, "pairs": case.pairs, "pixels": effort.pixels}
+    return {**setting, "norm": norm, "rows": rows}
+
+
+def _opened_peer(stack: ExitStack, python: str, backend: str) -> tuple[_peers.Peer | None, dict[str, str]]:
+    """The running peer, closed with `stack`, or None where it is absent; and its entry in the document."""
+    try:
+        peer = stack.enter_context(_peers.Peer(python))
+    except Absent as exc:
+        return None, {"name": "fastsar", "absent": f"{exc}; --peer-python PATH names a Python that has it"}
+    return peer, {"name": "fastsar", "version": peer.version, "python": peer.python, "backend": backend}
 
 
 def _others(
     case: _cases.BenchCase, folder: Path, peer: _peers.Peer | None, backend: str, methods: Sequence[str]
 ) -> list[Any]:
     """The NumPy baseline, and the peer where there is one."""
-    found = []
+    others = []
     if "direct" in methods:
-        found += _baseline.competitors(case)
+        others += _baseline.competitors(case)
     if peer is not None:
         try:
             peer.load(folder)
-            found += _peers.competitors(case, peer, methods, backend)
+            others += _peers.competitors(case, peer, methods, backend)
         except Absent as exc:
             lost = str(exc)
 
-            def gone() -> Any:
+            def gone() -> NoReturn:
                 raise Absent(lost)
 
-            found += [_competitor.Competitor(peer.name, backend, method, "any", gone) for method in methods]
-    return found
+            others += [_competitor.Competitor(peer.name, backend, method, "any", gone) for method in methods]
+    return others
 
 
-def _listed(devices: Sequence[Any] | None) -> list[Any]:
-    if devices:
-        return list(dict.fromkeys(devices))
-    return [info.index for info in device_list.devices() if info.works] or [None]
+def _opened_devices(devices: Sequence[Any] | None, no_fp64: bool) -> list[Device]:
+    """The devices, all that work by default, and with no_fp64 a twin without float64 of each that has it."""
+    if not devices:
+        devices = [info.index for info in device_list.devices() if info.works] or [None]
+    opened = [open_device(device) for device in dict.fromkeys(devices)]
+    return opened + [device.without_fp64() for device in opened if no_fp64 and device.info.fp64]
 
 
 def _device(device: Device) -> dict[str, Any]:
@@ -202,7 +225,7 @@ def write(document: Document, path: Path) -> None:
         part.write_text(json.dumps(document, indent=1, default=_plain) + "\n")
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: object) -> object:
     """NumPy numbers of a plan as plain numbers, lists or text."""
     if isinstance(value, np.generic):
         return value.item()

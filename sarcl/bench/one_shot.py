@@ -13,14 +13,12 @@ def main(folder: str, options: str) -> None:
     from ..opencl.choose_device import open_device
     from . import _cases
 
-    given = json.loads(options)
-    device = open_device(given["device"])
-    if not given["fp64"]:
+    request = json.loads(options)
+    device = open_device(request["device"])
+    if not request["fp64"]:
         device = device.without_fp64()
     raw, grid = _cases.load(Path(folder))
-    backproject(
-        raw, grid, tolerance=given["tolerance"], method=given["method"], device=device, check=False
-    )  # fmt: skip
+    backproject(raw, grid, tolerance=request["tolerance"], method=request["method"], device=device, check=False)
 
 
 if __name__ == "__main__":

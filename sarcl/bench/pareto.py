@@ -28,49 +28,49 @@ def picture(cases: list[ratios.Result]) -> bytes:
         raise ValueError("no case has a row that ran; there is nothing to draw")
     columns = 1 if len(drawn) < 4 else 2
     rows = -(-len(drawn) // columns)
-    made = plots.figure((columns * PANEL[0], rows * PANEL[1]))
-    made.set_layout_engine("constrained")
+    label = plots.figure((columns * PANEL[0], rows * PANEL[1]))
+    label.set_layout_engine("constrained")
     styles = _styles(drawn)
-    panels = [made.add_subplot(rows, columns, i + 1) for i in range(len(drawn))]
+    panels = [label.add_subplot(rows, columns, i + 1) for i in range(len(drawn))]
     for axes, case in zip(panels, drawn, strict=True):
         _draw(axes, case, styles)
-    made.canvas.draw()  # places the panels; labels are then put where none stands yet
+    label.canvas.draw()  # places the panels; labels are then put where none stands yet
     for axes, case in zip(panels, drawn, strict=True):
         _label(axes, case, styles)
-    return plots.png(made, 256)
+    return plots.png(label, 256)
 
 
 def series(case: ratios.Result) -> Series:
     """The rows of each curve, by its label; sarcl's first, the exact peers' by kind of interpolation."""
-    found: Series = {}
+    curves: Series = {}
     for row in sorted(ratios.ran(case), key=lambda row: not ratios.is_sarcl(row)):
         label = f"{row['who']} {row['method']}"
         if ratios.is_sarcl(row):
             label += f", {row['device']}"
         elif row["method"] == "direct":
             label += f", {row['setting'].split(',')[0]}"
-        found.setdefault(label, []).append(row)
-    return found
+        curves.setdefault(label, []).append(row)
+    return curves
 
 
 def _styles(cases: list[ratios.Result]) -> dict[str, dict[str, Any]]:
     """Options of every curve for matplotlib, the same in all panels."""
-    found: dict[str, dict[str, Any]] = {}
+    styles: dict[str, dict[str, Any]] = {}
     ours = theirs = 0
     for case in cases:
         for label, rows in series(case).items():
-            if label in found:
+            if label in styles:
                 continue
             if ratios.is_sarcl(rows[0]):
-                found[label] = {"color": OURS[ours % len(OURS)], "marker": "o", "linestyle": plots.LINES[ours % 4]}
+                styles[label] = {"color": OURS[ours % len(OURS)], "marker": "o", "linestyle": plots.LINES[ours % 4]}
                 ours += 1
             else:
                 # Settings of a peer's factorized former are no sequence: their points are not connected.
                 line = "--" if rows[0]["method"] == "direct" else "none"
                 look = {"color": THEIRS[theirs % len(THEIRS)], "marker": MARKS[theirs % len(MARKS)], "linestyle": line}
-                found[label] = look
+                styles[label] = look
                 theirs += 1
-    return found
+    return styles
 
 
 def _draw(axes: Axes, case: ratios.Result, styles: dict[str, dict[str, Any]]) -> None:
@@ -98,12 +98,12 @@ def _label(axes: Axes, case: ratios.Result, styles: dict[str, dict[str, Any]]) -
             else:
                 continue
             for shift in sides:
-                made = axes.annotate(
+                annotation = axes.annotate(
                     text, (row["error"], ratios.rate(case, row)), (0, shift), textcoords="offset points",
                     ha="center", fontsize=8, color=styles[label]["color"],
                 )  # fmt: skip
-                box = made.get_window_extent()
+                box = annotation.get_window_extent()
                 if not any(box.overlaps(other) for other in taken):
                     taken.append(box)
                     break
-                made.remove()
+                annotation.remove()

@@ -50,7 +50,7 @@ def matches(result: Result) -> list[dict[str, Any]]:
     Entries: peer, sarcl (rows; None where no row of sarcl has as small an error), device and method of sarcl's row,
     ratios peer/sarcl of the shortest form, call, process and cpu and of the median form.
     """
-    found = []
+    pairs = []
     rows = ran(result)
     for peer in (row for row in rows if not is_sarcl(row)):
         rivals = [
@@ -58,8 +58,8 @@ def matches(result: Result) -> list[dict[str, Any]]:
         ]
         for device, method in dict.fromkeys((row["device"], row["method"]) for row in rivals):
             same = [row for row in rivals if (row["device"], row["method"]) == (device, method)]
-            found.append(_match(peer, same, device, method))
-    return found
+            pairs.append(_match(peer, same, device, method))
+    return pairs
 
 
 def _match(peer: Row, rivals: list[Row], device: str, method: str) -> dict[str, Any]:
@@ -90,14 +90,14 @@ def growth(results: list[Result]) -> list[dict[str, Any]]:
             lines.setdefault(key, []).append(
                 (result["n"], best(row) or np.nan, row["error"], best(row, "cpu") or np.nan)
             )
-    found = []
+    exponents = []
     names = ("scene", "data", "who", "device", "method", "setting")
     for line, points in lines.items():
         points.sort()
         sizes, seconds, errors, busy = (list(column) for column in zip(*points, strict=True))
         if len(set(sizes)) < 2:
             continue
-        found.append(
+        exponents.append(
             {
                 **dict(zip(names, line, strict=True)),
                 "sizes": sizes,
@@ -107,7 +107,7 @@ def growth(results: list[Result]) -> list[dict[str, Any]]:
                 "cpu_exponent": _slope(sizes, busy) if np.isfinite(busy).all() else None,
             }
         )
-    return found
+    return exponents
 
 
 def _slope(sizes: list[float], seconds: list[float]) -> float:

@@ -115,7 +115,7 @@ def missing(result: ratios.Result) -> list[str]:
     for row in result["rows"]:
         if "absent" in row:
             reasons.setdefault((f"{name(row)}, {row['method']}", row["absent"]), []).append(row["setting"])
-    lines = [f"{who} at {'; '.join(at)}: absent: {why}" for (who, why), at in reasons.items()]
+    lines = [f"{who} at {'; '.join(cells)}: absent: {why}" for (who, why), cells in reasons.items()]
     disturbed = sum(row.get("disturbed", 0) for row in result["rows"])
     return lines + ([f"{disturbed} runs began while other programs ran"] if disturbed else [])
 

@@ -7,12 +7,19 @@ z = 0 and heading along +x, then turned and placed.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..scene.material import Material
 from ..scene.scene import Scene
+
+if TYPE_CHECKING:
+    from trimesh import Trimesh
+
+NumberOrArray = TypeVar("NumberOrArray", float, np.ndarray)
+Chord = list[tuple[float, float]]  # (x, y) of its ends, m
 
 HALF = 26.5  # m, half the side of the ground
 # Amplitude reflectivities, chosen to look like an airfield at X band
@@ -22,7 +29,7 @@ ROUGH = Material(diagram="cos")  # rough on a scale below the facets, so that ev
 # such facets is clipped exactly
 SLIGHTLY_ROUGH = Material(diagram="cos", height=4e-3)
 APRON, APRON_SIZE = (13.0, 9.5), (17.0, 12.0)  # m: middle and sides of the slab before the hangar
-APRON_HEIGHT = 0.03  # m, of the slab above the ground
+APRON_HEIGHT = 0.03  # m, height of the slab above the ground
 FLAT_BEYOND = 3.0  # m about the apron, over which the ground rises to its own height
 
 
@@ -51,7 +58,7 @@ def rough(level: float) -> Material:
     return replace(ROUGH, reflectivity=level)
 
 
-def place(meshes: list[Any], at: tuple[float, float], heading_deg: float, material: Material) -> Scene:
+def place(meshes: list[Trimesh], at: tuple[float, float], heading_deg: float, material: Material) -> Scene:
     """Meshes turned by a heading and placed on the ground."""
     position = (*at, float(relief(*at)))
     c, s = np.cos(np.radians(heading_deg)), np.sin(np.radians(heading_deg))
@@ -62,7 +69,7 @@ def place(meshes: list[Any], at: tuple[float, float], heading_deg: float, materi
     return parts[0]
 
 
-def relief(x: Any, y: Any) -> Any:
+def relief(x: NumberOrArray, y: NumberOrArray) -> NumberOrArray:
     """Height of the ground, m: flat near the taxiway and under the apron, gently undulating away from them."""
     beside = [np.maximum(np.abs(at - APRON[i]) - APRON_SIZE[i] / 2, 0) for i, at in enumerate((x, y))]
     away = 1 - np.exp(-((taxiway(x, y) / 12) ** 2))
@@ -70,7 +77,7 @@ def relief(x: Any, y: Any) -> Any:
     return away * (0.5 * np.sin(x / 6.5 + 1) * np.cos(y / 8.0) + 0.25 * np.sin((x + 2 * y) / 5.1))
 
 
-def taxiway(x: Any, y: Any) -> Any:
+def taxiway(x: NumberOrArray, y: NumberOrArray) -> NumberOrArray:
     """Distance from the taxiway's bent middle line, m."""
     return (y - 1.5 - 5 * np.tanh((x + 3) / 8)) / np.sqrt(1 + (0.62 / np.cosh((x + 3) / 8) ** 2) ** 2)
 
@@ -125,7 +132,7 @@ def tree(foot: tuple[float, float, float], height: float, random: np.random.Gene
     return Scene.facets(corners + np.asarray(foot), material=rough(0.45))
 
 
-def aeroplane() -> list[Any]:
+def aeroplane() -> list[Trimesh]:
     """A small airliner, 22 m long and 22 m across."""
     import trimesh
 
@@ -174,13 +181,15 @@ def aeroplane() -> list[Any]:
     return [*parts, nose, fin]
 
 
-def slab(root: Any, tip: Any, side: int, z_root: float, z_tip: float, thick_root: float, thick_tip: float) -> Any:
+def slab(
+    root: Chord, tip: Chord, side: int, z_root: float, z_tip: float, thick_root: float, thick_tip: float
+) -> Trimesh:
     """A wing: the hull of two chords (x, y), each of some thickness."""
     corners = [(x, side * y, z_root + s * thick_root / 2) for x, y in root for s in (-1, 1)]
     return hull(corners + [(x, side * y, z_tip + s * thick_tip / 2) for x, y in tip for s in (-1, 1)])
 
 
-def tank() -> list[Any]:
+def tank() -> list[Trimesh]:
     """A battle tank, hull 7 m long, its gun forward."""
     import trimesh
 
@@ -199,13 +208,13 @@ def tank() -> list[Any]:
     return [*tracks, body, turret, gun]
 
 
-def hangar() -> list[Any]:
+def hangar() -> list[Trimesh]:
     """A gabled hall 12 x 8 m, 4 m to the eaves and 6 m to the ridge, its ridge along x."""
     low = [(x, y, z) for x in (-6, 6) for y in (-4, 4) for z in (0, 4)]
     return [hull([*low, (-6, 0, 6), (6, 0, 6)])]
 
 
-def tower() -> list[Any]:
+def tower() -> list[Trimesh]:
     """A control tower 10 m high: a shaft, a glazed cab that widens upwards, a mast."""
     import trimesh
 
@@ -222,7 +231,7 @@ def tower() -> list[Any]:
     ]
 
 
-def hull(corners: Any) -> Any:
+def hull(corners: ArrayLike) -> Trimesh:
     """The convex hull of points, m (n, 3), as a mesh."""
     import trimesh
 

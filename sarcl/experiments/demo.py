@@ -6,19 +6,21 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..base.constants import SPEED_OF_LIGHT
 
 if TYPE_CHECKING:
+    from ..base.types import PathLike
     from ..model.image import Image
     from ..model.image_grid import ImageGrid
     from ..model.phase_history import PhaseHistory
     from ..model.trajectory import Trajectory
     from ..model.waveform import Waveform
     from ..numerics.windows import Window
+    from ..opencl.device import DeviceChoice
 
 CENTER = 9.6e9  # Hz
 GRAZING_DEG = 35.0
@@ -76,10 +78,10 @@ QUICK = Setting(bandwidth=330e6, arc=0.044, n_pulses=192, n_pixels=320)
 
 
 def run(
-    out: Any = "out",
+    out: PathLike = "out",
     *,
     quick: bool = False,
-    device: Any = None,
+    device: DeviceChoice | None = None,
     seed: int = 0,
     progress: Callable[[str, int, int], None] | None = None,
     say: Callable[[str], None] = print,
@@ -103,13 +105,7 @@ def run(
     scene = _demo_scene.scene(setting.edge, seed)
     clock.stage("scene", f"an airfield of {len(scene.triangles):,} facets, made by code")
     raw = echo(
-        scene,
-        setting.waveform(),
-        setting.track(),
-        seed=seed,
-        tolerance=TOLERANCE,
-        device=opened,
-        progress=progress,
+        scene, setting.waveform(), setting.track(), seed=seed, tolerance=TOLERANCE, device=opened, progress=progress
     )
     clock.stage("echo", f"{raw.n_rows} pulses of {raw.n_samples} samples{_rate(raw, 'facet x pulse')}")
     image = backproject(raw, setting.grid(), window=WINDOW, tolerance=TOLERANCE, device=opened, progress=progress)
@@ -127,7 +123,7 @@ def run(
     return image
 
 
-def outputs(out: Any) -> tuple[Path, Path]:
+def outputs(out: PathLike) -> tuple[Path, Path]:
     """The files to write in the folder `out`, which is made where it is missing."""
     from ..io.output_paths import check_writable
 

@@ -1,4 +1,4 @@
-"""Which rows saw a pixel, and the sum of their weights: the gain of the image, pixel by pixel.
+"""Rows that saw a pixel, and the sum of their weights: the gain of the image, pixel by pixel.
 
     gain(x) = sum_p v_p(x) w_p sum_n w_n,    v_p(x) = 1 in the range window and the beam of row p, else 0
 
@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from ..base import validation
 from ..base.constants import SPEED_OF_LIGHT
@@ -23,9 +24,9 @@ from .focusing_task import FocusingTask
 from .tiling.of_grid import tiling_of
 
 SIDE = 16  # pixels along a side of a tile
-ROWS = 256  # of Image.aperture, at most
+ROWS = 256  # rows of Image.aperture, at most
 PAIRS = 2**20  # pairs of a tile and a row that are looked at together
-SLACK = 1e-9  # of the largest distance: rounding of the distances of tiles, which are differences of squares
+SLACK = 1e-9  # share of the largest distance, by which distances of tiles are rounded, which are differences of squares
 
 
 def may_vary(task: FocusingTask) -> bool:
@@ -44,19 +45,17 @@ def may_vary(task: FocusingTask) -> bool:
     return bool((most - reference > half * (1 - SLACK)).any() or (reference - least > half * (1 - SLACK)).any())
 
 
-def room_for_gain(task: FocusingTask, dtype: Any) -> None:
+def room_for_gain(task: FocusingTask, dtype: DTypeLike) -> None:
     """MemoryError where the gain needs a value per pixel and there is no memory for them."""
     if may_vary(task):
-        validation.room(
-            f"the gain of {' x '.join(map(str, task.grid.shape))} pixels, one number per pixel",
-            float(task.grid.size * _kind(dtype).itemsize), "focus parts of the grid",
-        )  # fmt: skip
+        gain = f"the gain of {' x '.join(map(str, task.grid.shape))} pixels, one number per pixel"
+        validation.room(gain, float(task.grid.size * _kind(dtype).itemsize), "focus parts of the grid")
 
 
 Gains = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
-def seen_by(task: FocusingTask, dtype: Any, tapered: Gains | None = None) -> dict[str, Any]:
+def seen_by(task: FocusingTask, dtype: DTypeLike, tapered: Gains | None = None) -> dict[str, Any]:
     """Fields `gain` and `aperture` of an Image.
 
     The gain is a number where it is the same in all pixels, else an array of the grid's shape. The aperture is None
@@ -64,9 +63,9 @@ def seen_by(task: FocusingTask, dtype: Any, tapered: Gains | None = None) -> dic
     beside complex128. tapered gives sums of weights that differ from pixel to pixel, of positions, m (n_tiles,
     per_tile, 3), and the number of rows that see each (`PixelTaper.gains`).
     """
-    whole = float(task.row_weight.sum() * task.sample_weight.sum())
+    total = float(task.row_weight.sum() * task.sample_weight.sum())
     if not may_vary(task):
-        return {"gain": whole}
+        return {"gain": total}
     tiling, grid = tiling_of(task.grid, SIDE), task.grid
     flat = np.zeros(grid.shape if tiling.in_rows else grid.size, _kind(dtype))
     coverage, complete = RowCoverage(task), True
@@ -79,12 +78,12 @@ def seen_by(task: FocusingTask, dtype: Any, tapered: Gains | None = None) -> dic
         complete = complete and bool((count == task.raw.n_rows).all())
         tiling.place((weight * task.sample_weight.sum()).ravel(), (band, band + 1), 0, orders, flat)
     if complete and tapered is None:
-        return {"gain": whole}
-    made = flat.reshape(grid.shape)
-    used = made if grid.empty is None else made[~grid.empty]
+        return {"gain": total}
+    image = flat.reshape(grid.shape)
+    used = image if grid.empty is None else image[~grid.empty]
     low, high = float(used.min()), float(used.max())
     # where no pixel is seen the image is zero, and a gain is not
-    gain = whole if high == 0 else low if low == high else made
+    gain = total if high == 0 else low if low == high else image
     return {"gain": gain, "aperture": _aperture(task)}
 
 
@@ -101,7 +100,7 @@ def _aperture(task: FocusingTask) -> np.ndarray:
     return np.column_stack([raw.tx[rows], raw.rx[rows], beam, *limits])
 
 
-def _kind(dtype: Any) -> np.dtype:
+def _kind(dtype: DTypeLike) -> np.dtype:
     return np.dtype(np.float64 if np.dtype(dtype) == np.complex128 else np.float32)
 
 
@@ -114,31 +113,34 @@ class RowCoverage:
     def sums(self, positions: np.ndarray, weights: np.ndarray) -> np.ndarray:
         """Sums (k, n_tiles, per_tile) of weights (k, n_rows) over the rows that see each of positions, m (n_tiles,
         per_tile, 3)."""
-        made = np.zeros((len(weights), *positions.shape[:2]))
-        for first, stop, whole, asked in self._tiles(positions):
-            made[:, first:stop] += (weights @ whole.T)[..., None]
-            for tile, rows in asked:
-                made[:, tile] += weights[:, rows] @ self.sees(positions[tile], rows)
-        return made
+        totals = np.zeros((len(weights), *positions.shape[:2]))
+        for first, stop, is_seen_whole, partly in self._tiles(positions):
+            totals[:, first:stop] += (weights @ is_seen_whole.T)[..., None]
+            for tile, rows in partly:
+                totals[:, tile] += weights[:, rows] @ self.sees(positions[tile], rows)
+        return totals
 
     def spans(self, positions: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Least and largest of places (n_rows,) of the rows that see positions, m (n_tiles, per_tile, 3): (n_tiles,
         per_tile) each, inf and -inf where none does."""
         least, most = np.full(positions.shape[:2], np.inf), np.full(positions.shape[:2], -np.inf)
-        for first, stop, whole, asked in self._tiles(positions):
-            least[first:stop] = np.where(whole, places, np.inf).min(axis=1)[:, None]
-            most[first:stop] = np.where(whole, places, -np.inf).max(axis=1)[:, None]
-            for tile, rows in asked:
+        for first, stop, is_seen_whole, partly in self._tiles(positions):
+            least[first:stop] = np.where(is_seen_whole, places, np.inf).min(axis=1)[:, None]
+            most[first:stop] = np.where(is_seen_whole, places, -np.inf).max(axis=1)[:, None]
+            for tile, rows in partly:
                 rows = rows[np.argsort(places[rows], kind="stable")]
                 # rows within the span that is known already add nothing
                 rows = rows[(places[rows] < least[tile, 0]) | (places[rows] > most[tile, 0])]
                 if len(rows) == 0:
                     continue
                 seen = self.sees(positions[tile], rows)
-                some, at = seen.any(axis=0), places[rows]
-                low, high = at[seen.argmax(axis=0)], at[len(rows) - 1 - seen[::-1].argmax(axis=0)]
-                least[tile] = np.where(some, np.minimum(least[tile], low), least[tile])
-                most[tile] = np.where(some, np.maximum(most[tile], high), most[tile])
+                is_seen, places_of_rows = seen.any(axis=0), places[rows]
+                low, high = (
+                    places_of_rows[seen.argmax(axis=0)],
+                    places_of_rows[len(rows) - 1 - seen[::-1].argmax(axis=0)],
+                )
+                least[tile] = np.where(is_seen, np.minimum(least[tile], low), least[tile])
+                most[tile] = np.where(is_seen, np.maximum(most[tile], high), most[tile])
         return least, most
 
     def sees(self, points: np.ndarray, rows: np.ndarray) -> np.ndarray:
@@ -174,11 +176,11 @@ class RowCoverage:
             stop = min(first + step, len(middle))
             x, reach = middle[first:stop] - origin, radius[first:stop, None] + SLACK * farthest
             distances = [_distances(x, e) for e in ends]
-            whole = np.ones((stop - first, raw.n_rows), bool)
-            outside = np.zeros_like(whole)
+            is_seen_whole = np.ones((stop - first, raw.n_rows), bool)
+            outside = np.zeros_like(is_seen_whole)
             if not self.task.wrap:
                 depth = half - np.abs(sum(distances) / len(ends) - raw.reference_range)
-                whole &= depth > reach
+                is_seen_whole &= depth > reach
                 outside |= depth < -reach
             if antennas.beam is not None:
                 angle = antennas.beam_angle / 2
@@ -187,11 +189,16 @@ class RowCoverage:
                 inside = along * np.sin(angle) - across * np.cos(angle)  # no more than the distance from the cone
                 # of a point on the axis `across` is a difference of nearly equal squares
                 slack = reach + np.abs(np.cos(angle)) * np.sqrt(SLACK) * farthest * (across < 1e-4 * distances[0])
-                whole &= inside > slack
+                is_seen_whole &= inside > slack
                 outside |= inside < -slack
-            asked = ~(whole | outside)
-            some = np.flatnonzero(asked.any(axis=1))
-            yield first, stop, whole, [(int(first + t), np.flatnonzero(asked[t])) for t in some]
+            is_seen_in_part = ~(is_seen_whole | outside)
+            tiles_in_part = np.flatnonzero(is_seen_in_part.any(axis=1))
+            yield (
+                first,
+                stop,
+                is_seen_whole,
+                [(int(first + t), np.flatnonzero(is_seen_in_part[t])) for t in tiles_in_part],
+            )
 
 
 def _distances(points: np.ndarray, ends: np.ndarray) -> np.ndarray:

@@ -24,12 +24,12 @@ from functools import cached_property
 
 import numpy as np
 
-FAINTEST = 1e-20  # of the power beside the pixels: where every pixel is at an exact null of every row
+FAINTEST = 1e-20  # share of the power beside the pixels, taken where every pixel is at an exact null of every row
 
 
 @dataclass(eq=False)
 class RowsInPhase:
-    """What a few rows contribute to some pixels, and beside them; 0 where a row does not see a pixel.
+    """Contributions of a few rows to some pixels, and beside them; 0 where a row does not see a pixel.
 
     delays  d_p (n_rows, n), in fractions of the range window
     values  c_p P_p(d_p), complex128 (n_rows, n);  beside  c_p Q_p(d_p + d) at some delays d, (n_rows, n, n_beside)
@@ -46,19 +46,15 @@ class RowsInPhase:
         zeros = np.zeros((n_rows, n, n_beside), np.complex128)
         return cls(np.zeros((n_rows, n)), zeros[..., 0].copy(), zeros)
 
-    def add(
-        self, row: int, inside: np.ndarray, delays: np.ndarray, cycles: np.ndarray, values: np.ndarray,
-        beside: np.ndarray, gains: np.ndarray | float,
-    ) -> None:  # fmt: skip
-        """What a row contributes.
+    def add(self, row: int, inside: np.ndarray, delays: np.ndarray, values: np.ndarray, beside: np.ndarray) -> None:
+        """Contributions of a row.
 
-        inside  whether it sees each pixel (n,);  delays, cycles  d_p and the phase of c_p (n,)
-        values, beside  P_p(d_p) and Q_p(d_p + d) of the pixels that it sees (m,), (m, n_beside), each times `gains`
+        inside  whether it sees each pixel (n,);  delays  d_p (n,)
+        values, beside  c_p P_p(d_p) and c_p Q_p(d_p + d) of the pixels that it sees, (m,) and (m, n_beside)
         """
-        turns = np.exp(2j * np.pi * (cycles[inside] % 1)) * gains
         self.delays[row] = delays
-        self.values[row, inside] = turns * values
-        self.beside[row, inside] = turns[:, None] * beside
+        self.values[row, inside] = values
+        self.beside[row, inside] = beside
 
     def ratio(self, length: int = 0) -> float:
         """Largest norm of N_m over the pixels at any d, relative to the pixels themselves, for m = -1, 0, 1.
@@ -79,6 +75,6 @@ class RowsInPhase:
     @cached_property
     def _power(self) -> float:
         """Of the pixels."""
-        whole = float((np.abs(self.values.sum(axis=0)) ** 2).sum())
+        in_phase = float((np.abs(self.values.sum(axis=0)) ** 2).sum())
         power = float((np.abs(self.values) ** 2).sum())
-        return max(whole, power, FAINTEST * float((np.abs(self.beside) ** 2).sum()))
+        return max(in_phase, power, FAINTEST * float((np.abs(self.beside) ** 2).sum()))

@@ -11,9 +11,10 @@ Kernels: kernels/pixel_weights.clh, kernels/gains.clh; reference: AntennaWeights
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypeAlias, TypeGuard
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..base import wgs84
 from ..base.rows import spread_over
@@ -28,20 +29,22 @@ from ..scattering.antenna_weight_error import ANGLE, PATTERN
 from ..scattering.antenna_weights import AntennaWeights
 
 if TYPE_CHECKING:
+    from ..opencl.device import Buffer
     from .focusing_task import FocusingTask
 
-PIXELS, ROWS = 256, 64  # from which the mean gain is estimated
+AntennaBeam: TypeAlias = Antenna | tuple[Antenna, ArrayLike | Trajectory]  # and its direction or attitude
+PIXELS, ROWS = 256, 64  # pixels and rows from which the mean gain is estimated
 LEAST_DISTANCE = 1e-6  # radii of a tile: no direction is left so near to an antenna
 
 
-def is_antenna(beam: Any) -> bool:
+def is_antenna(beam: object) -> TypeGuard[AntennaBeam]:
     """Whether `beam` is an Antenna, or one with its direction."""
     return isinstance(beam, Antenna) or (
         isinstance(beam, (tuple, list)) and bool(beam) and isinstance(beam[0], Antenna)
     )
 
 
-def antenna_of(raw: PhaseHistory, beam: Any, center: np.ndarray) -> AntennaWeights:
+def antenna_of(raw: PhaseHistory, beam: AntennaBeam, center: np.ndarray) -> AntennaWeights:
     """Gains for `beam`: an Antenna, whose boresight follows `center`, m (3,), or (antenna, aim).
 
     aim  direction of the boresight, (3,) or (n_rows, 3); or attitude, (n_rows, 3, 3) as Trajectory.attitude, or a
@@ -65,7 +68,9 @@ def picked(antenna: AntennaWeights, rows: np.ndarray) -> AntennaWeights:
     return replace(antenna, geometry=antenna.geometry.picked(rows), axes=(antenna.axes[0][rows], antenna.axes[1][rows]))
 
 
-def _axes(antenna: Antenna, track: Trajectory, aim: Any, center: np.ndarray, up: np.ndarray | None) -> np.ndarray:
+def _axes(
+    antenna: Antenna, track: Trajectory, aim: ArrayLike | Trajectory | None, center: np.ndarray, up: np.ndarray | None
+) -> np.ndarray:
     if aim is None:
         return antenna.axes(pointing.spotlight(track, center, up=up))
     if isinstance(aim, Trajectory):
@@ -76,15 +81,15 @@ def _axes(antenna: Antenna, track: Trajectory, aim: Any, center: np.ndarray, up:
                 f"{len(track)} rows, such as of pointing.stripmap"
             )
         aim = aim.attitude
-    given = converted("beam[1]", aim, np.float64)
-    if given.shape == (len(track), 3, 3):
-        return antenna.axes(replace(track, attitude=given))
-    if given.shape not in ((3,), (len(track), 3)):
+    attitude = converted("beam[1]", aim, np.float64)
+    if attitude.shape == (len(track), 3, 3):
+        return antenna.axes(replace(track, attitude=attitude))
+    if attitude.shape not in ((3,), (len(track), 3)):
         raise ValueError(
-            f"beam[1] has shape {given.shape}; with an Antenna give the direction of its boresight, (3,) or "
+            f"beam[1] has shape {attitude.shape}; with an Antenna give the direction of its boresight, (3,) or "
             f"({len(track)}, 3), its attitude, ({len(track)}, 3, 3), or a Trajectory with an attitude per row"
         )
-    return antenna.axes(pointing.fixed(track, given, up=up))
+    return antenna.axes(pointing.fixed(track, attitude, up=up))
 
 
 def rounding(task: FocusingTask, radius: float) -> float:
@@ -115,12 +120,12 @@ def shares(task: FocusingTask, points: np.ndarray) -> np.ndarray:
     """Weights conj(g), complex (n, n_rows), of points, m (n, 3), in all rows."""
     beam = task.antenna
     assert beam is not None
-    made = [beam.weights(points, row, beam.frequency).conj() for row in range(task.raw.n_rows)]
-    return np.stack(made, axis=1)
+    gains = [beam.weights(points, row, beam.frequency).conj() for row in range(task.raw.n_rows)]
+    return np.stack(gains, axis=1)
 
 
 class AntennaOnDevice:
-    """What the kernels read of an antenna; gain  True: they add up |g|^2 times the rows' weights, not the echoes."""
+    """Buffers of an antenna for the kernels; gain  True: they add up |g|^2 times the rows' weights, not the echoes."""
 
     def __init__(self, device: Device, task: FocusingTask, gain: bool) -> None:
         assert task.antenna is not None
@@ -128,7 +133,7 @@ class AntennaOnDevice:
         self.patterns, self.second = self.beam.upload(device)
         self.macros = {**self.beam.macros(1), "WEIGHT": 3 if gain else 2}
 
-    def arguments(self, start: int, stop: int) -> tuple[Any, ...]:
+    def arguments(self, start: int, stop: int) -> tuple[Buffer, ...]:
         """The kernel's arguments of rows start ... stop - 1: weights, patterns, axes."""
         axes = self.beam.packed_axes(np.arange(start, stop))
         weights = self.task.row_weight[start:stop].astype(np.float32)

@@ -176,7 +176,7 @@ class BackprojectPlan:
         return LocalWorkers(engines, budgets, [d.info.name for d in devices], task.raw.n_rows, rates)
 
     def _fields(self, filler: BandFiller, skipped: Skipped, n_kept: int, output: ImageOutput) -> dict[str, Any]:
-        """What the Image says of its data: gain, carrier, collection, report; warns of pixels that no row sees.
+        """Fields of the Image about its data: gain, carrier, collection, report; warns of pixels that no row sees.
 
         n_kept  bands that files of earlier runs held
         """
@@ -214,12 +214,7 @@ class BackprojectPlan:
             device=" + ".join(filler.workers.names),
         )
         frequency = float(np.median(task.antennas.frequency))
-        return {
-            **gain,
-            "frequency": frequency,
-            "report": report,
-            **collection(task.raw, grid, self.options.window),
-        }
+        return {**gain, "frequency": frequency, "report": report, **collection(task.raw, grid, self.options.window)}
 
     def _measured(self, data: Any, clock: Clock) -> float | None:
         """The error at random pixels, where that is asked for or cheap."""
@@ -250,9 +245,9 @@ def _piece(options: BackprojectOptions) -> tuple[int, int] | None:
     if resume is not None:
         instance("resume", resume, bool)
     if (tile is not None or resume) and not is_path(options.out):
-        name, given = ("tile", tile) if tile is not None else ("resume", resume)
+        name, value = ("tile", tile) if tile is not None else ("resume", resume)
         raise ValueError(
-            f'{name} is {" ".join(repr(given).split()):.60} but out is no path; give out="image.h5": tiles are '
+            f'{name} is {" ".join(repr(value).split()):.60} but out is no path; give out="image.h5": tiles are '
             "kept beside it"
         )
     if tile is None:
@@ -268,7 +263,9 @@ def _piece(options: BackprojectOptions) -> tuple[int, int] | None:
     return i, n
 
 
-def _antenna_gain(task: FocusingTask, chosen: MethodChoice, device: Device, options: BackprojectOptions) -> Any:
+def _antenna_gain(
+    task: FocusingTask, chosen: MethodChoice, device: Device, options: BackprojectOptions
+) -> float | np.ndarray | None:
     """Sums of the squared gains of the antenna times the weights, float32 of the grid's shape; a number where they are
     the same in all pixels; None where they are 0 in all: the antenna sees no pixel inside a range window."""
     engine: Any = chosen.engine
@@ -276,16 +273,16 @@ def _antenna_gain(task: FocusingTask, chosen: MethodChoice, device: Device, opti
     sums = engine(device, task, chosen.plan, tiling, gain=True)
     flat = np.zeros(task.grid.shape if tiling.in_rows else task.grid.size, np.float32)
     for first, last in sums.blocks(budget):
-        made = BandBuffer(tiling, first, last, np.complex64)
-        sums.fill(first, last, made, budget, Clock(), lambda rows: None)
-        flat[tiling.extent(first, last)] = made.values.real
+        bands = BandBuffer(tiling, first, last, np.complex64)
+        sums.fill(first, last, bands, budget, Clock(), lambda rows: None)
+        flat[tiling.extent(first, last)] = bands.values.real
     flat *= task.sample_weight.sum()
     if not flat.any():
         return None
     return float(flat.flat[0]) if flat.min() == flat.max() > 0 else flat.reshape(task.grid.shape)
 
 
-def _measure_error(task: FocusingTask, grid: ImageGrid, data: Any) -> float:
+def _measure_error(task: FocusingTask, grid: ImageGrid, data: Any) -> float:  # data: an array, or a dataset of a file
     """Relative error at up to 256 random pixels against the exact float64 sum, as `tolerance` is defined."""
     from ..reference.backproject import backproject as exact
 
@@ -294,12 +291,12 @@ def _measure_error(task: FocusingTask, grid: ImageGrid, data: Any) -> float:
     share = None if task.taper is None else PixelTaper(task).weights(positions)
     if task.antenna is not None:
         share = shares(task, positions)
-    wanted, spread = exact(task.raw, positions, task.sample_weight, task.row_weight, task.wrap, beam, EDGE, share)
+    truth, spread = exact(task.raw, positions, task.sample_weight, task.row_weight, task.wrap, beam, EDGE, share)
     got = (
         np.asarray(data)[index]
         if isinstance(data, np.ndarray)
         else np.array([data[i] for i in zip(*index, strict=True)])
     )
-    clear = np.isfinite(wanted)
-    wrong, scale = float(np.linalg.norm((got - wanted)[clear])), max(float(np.linalg.norm(wanted[clear])), spread)
+    clear = np.isfinite(truth)
+    wrong, scale = float(np.linalg.norm((got - truth)[clear])), max(float(np.linalg.norm(truth[clear])), spread)
     return wrong / scale if wrong else 0.0

@@ -84,9 +84,7 @@ class BackprojectOptions(GridOptions):
         None, 'see `sarcl.devices`; a list of devices, or "all", for several at once', in_files=False
     )
     cluster: distributed.Client | None = option(
-        None,
-        "a dask.distributed.Client whose workers compute the tiles, each on a device of its own",
-        in_files=False,
+        None, "a dask.distributed.Client whose workers compute the tiles, each on a device of its own", in_files=False
     )
 
     def task(self, raw: PhaseHistory, grid: ImageGrid) -> tuple[PhaseHistory, FocusingTask]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from ..base.validation import LARGEST_TOLERANCE
 from ..numerics import cost_model, error_bounds
 from ..numerics import plan as numerics_plan
 from ..numerics.cost_model import CPU, DeviceClass
-from ..numerics.plan import LEAST_TOLERANCE
+from ..numerics.plan import LEAST_TOLERANCE, PROFILES
 from ..numerics.range_profiles import TINY
 from ..opencl.device import Device
 from . import antenna_beam, profile_energy
@@ -31,8 +32,9 @@ from .tiling.of_grid import tiling_of
 from .tiling.tiling import Tiling
 
 METHODS = ("auto", "direct", "factorized")
-NEAR_ORIGIN = "put the origin near the scene"
-ROUNDING = 0.5  # largest share of a tolerance for rounding errors from echoes that lie away from the pixels
+ROUNDING = 0.5  # largest share of a tolerance for each error that no plan makes smaller; the plan needs the rest
+GAINS, SUMS = "float32 gains of the antenna", "rounding of float32 sums"
+COORDINATES, NEAR_ORIGIN = "float64 coordinates of a plane's pixels", "put the origin near the scene"
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,12 +70,18 @@ class MethodChoice:
         return self.engine(device, task, self.plan, self.tiling)
 
 
+Planner: TypeAlias = Callable[[FocusingTask, float, DeviceClass], tuple[ImagePlan, Tiling]]
+Candidate: TypeAlias = (
+    MethodChoice | ToleranceUnreachable
+)  # a plan, or its refusal: `choose` raises the one that counts
+
+
 def choose(
-    task: FocusingTask, method: str, tolerance: float, on: DeviceClass = CPU, float64: bool = True
+    task: FocusingTask, method: str, tolerance: float, devices: DeviceClass = CPU, float64: bool = True
 ) -> MethodChoice:
     """The cheapest plan that meets `tolerance` with `method`, or with any method for "auto".
 
-    on       the devices that follow the plan
+    devices  those that follow the plan
     float64  the devices have float64, for tolerances that complex64 cannot meet
     ToleranceUnreachable names the best tolerance that can be met. ValueError for samples or paths with which no
     tolerance can.
@@ -85,20 +93,22 @@ def choose(
                 "cross-range with a beam does, or an Antenna as beam: take method='direct' or 'auto', or "
                 "window=(range, None) and a beam of an angle"
             )
-        return _factorized(task, tolerance, on, float64)
-    direct = _direct(task, tolerance, on, float64)
-    if (
-        method == "direct"
-        or task.taper is not None
-        or direct.dtype != np.complex64
-        or task.pairs < cost_model.SEARCH_PAYS
-    ):
+        return _confirmed(_factorized(task, tolerance, devices, float64))
+    direct = _confirmed(_direct(task, tolerance, devices, float64))
+    is_merging_possible = not task.weighs_pixels and direct.dtype == np.complex64
+    if method == "direct" or not is_merging_possible or task.pairs < cost_model.SEARCH_PAYS:
         return direct
-    try:
-        merged = _Float32(task, tolerance).factorized(on)
-    except ToleranceUnreachable:
-        return direct
-    return merged if merged.cost < cost_model.MERGING_PAYS * direct.cost else direct
+    merged = _Float32(task, tolerance).factorized(devices)
+    if isinstance(merged, MethodChoice) and merged.cost < cost_model.MERGING_PAYS * direct.cost:
+        return merged
+    return direct
+
+
+def _confirmed(candidate: Candidate) -> MethodChoice:
+    """The choice; the refusal is raised."""
+    if isinstance(candidate, ToleranceUnreachable):
+        raise candidate
+    return candidate
 
 
 class _Float32:
@@ -124,50 +134,48 @@ class _Float32:
         if task.grid.is_plane:  # listed points are taken as they are
             farthest = float(np.abs(task.grid.bounds).max())
             self.coordinates = error_bounds.coordinate_rounding(farthest, task.highest)
-        self._aim(self.energy.darkness())
+        self._divide_tolerance(self.energy.darkness())
 
-    def _aim(self, near: float) -> None:
-        """Leave a plan what it may take of the tolerance where its errors are `near` times those of its kernels."""
-        self.near = near
-        self.rounding = error_bounds.sum_rounding(tile_kernels.CHUNK, self.task.raw.n_samples) * max(
-            self.energy.whole_profile - near, 0.0
-        )
-        left = np.sqrt(max(self.tolerance**2 - self.coordinates**2, 0.0))
-        self.inner = float(left - self.rounding - self.gains) / near
-
-    def _planned(self, make: Callable[[float], tuple[ImagePlan, Tiling]]) -> tuple[ImagePlan, Tiling]:
-        """The plan that `make` finds for the tolerance that is left. How the errors of few rows add up depends on the
-        length of its profiles: where they add up to more, there is less left."""
-        while True:
-            made = make(self.inner)
-            near = self.energy.darkness(made[0].length)
-            if near <= self.near:
-                return made
-            self._aim(near)
-
-    def direct(self, on: DeviceClass) -> MethodChoice:
-        """Every pair of row and pixel. ToleranceUnreachable names the best tolerance in complex64."""
-        self._must_round_less("in complex64", self._best)
+    def direct(self, devices: DeviceClass) -> Candidate:
+        """Every pair of row and pixel; a refusal names the best tolerance in complex64."""
+        refusal = self._refusal("in complex64")
         radius = tiling_of(self.task.grid, 8).radius  # of the smallest tiles
-        if not self.task.resolves_beam(radius):
-            raise ToleranceUnreachable(
-                self.tolerance, None, "float32 differences in a beam", "take smaller pixels, or a device with float64",
-                how=f"in complex64: beam is narrower than float32 resolves in tiles of {radius:.3g} m so near a track",
-            )  # fmt: skip
-        try:
-            made = self._planned(lambda left: direct_method.make_plan(self.task, left, on))
-        except ToleranceUnreachable as refused:
-            raise refused.restated(self.tolerance, self._best()) from None
-        return self._offer("direct", made, direct_method.Direct)
+        if refusal is None and not self.task.resolves_beam(radius):
+            how = f"in complex64: beam is narrower than float32 resolves in tiles of {radius:.3g} m so near a track"
+            remedy = "take smaller pixels, or a device with float64"
+            return ToleranceUnreachable(self.tolerance, None, "float32 differences in a beam", remedy, how)
+        candidate = refusal or self._planned("direct", direct_method.make_plan, direct_method.Direct, devices)
+        if isinstance(candidate, ToleranceUnreachable):
+            return candidate.restated(self.tolerance, self._best())
+        return candidate
 
-    def factorized(self, on: DeviceClass) -> MethodChoice:
-        """With sub-apertures. ToleranceUnreachable gives the reason, but no best tolerance, which takes a search."""
-        self._must_round_less("with sub-apertures", lambda: None)
-        try:
-            made = self._planned(lambda left: factorized_plan.make_plan(self.task, left, on))
-        except ToleranceUnreachable as refused:
-            raise refused.restated(self.tolerance, None) from None
-        return self._offer("factorized", made, Factorized)
+    def factorized(self, devices: DeviceClass) -> Candidate:
+        """With sub-apertures; a refusal gives the reason, but no best tolerance, which takes a search."""
+        refusal = self._refusal("with sub-apertures")
+        candidate = refusal or self._planned("factorized", factorized_plan.make_plan, Factorized, devices)
+        if isinstance(candidate, ToleranceUnreachable):
+            return candidate.restated(self.tolerance, None)
+        return candidate
+
+    def _refusal(self, representation: str) -> ToleranceUnreachable | None:
+        """Refusal by the largest of the errors that no plan makes smaller and that take more than ROUNDING of the
+        tolerance."""
+        errors = (
+            ErrorTerm(GAINS, self.gains, "aim it at the grid, or give the beam an angle"),
+            ErrorTerm(COORDINATES, self.coordinates, NEAR_ORIGIN),
+            ErrorTerm(SUMS, self.rounding, ""),
+        )
+        excessive = [error for error in errors if not error.value <= ROUNDING * self.tolerance]
+        if not excessive:
+            return None
+        largest, ratio = max(excessive, key=lambda error: error.value), 20 * np.log10(self.energy.whole_profile)
+        reason = {
+            GAINS: f"gains of the antenna have an error of {self.gains:.1g}",
+            COORDINATES: f"coordinates this large are rounded by {self.coordinates:.1g} rad of phase",
+            SUMS: f"these pixels are {ratio:.0f} dB darker than what else is in the same rows",
+        }[largest.name]
+        how = f"{representation}: {reason}"
+        return ToleranceUnreachable(self.tolerance, None, largest.name, largest.remedy, how)
 
     def _best(self) -> float | None:
         """The smallest tolerance that `direct` meets: rounding takes half of it at most, and the plan the rest."""
@@ -180,60 +188,58 @@ class _Float32:
         least = max(least, *(error / ROUNDING for error in (self.rounding, self.coordinates, self.gains)))
         return askable(rounded_up(float(least) * (1 + 1e-9)))
 
-    def _must_round_less(self, how: str, best: Callable[[], float | None]) -> None:
-        """ToleranceUnreachable where rounding alone takes too much. best()  what can be met: found where it is not."""
-        if not self.gains <= ROUNDING * self.tolerance:
-            raise ToleranceUnreachable(
-                self.tolerance, best(), "float32 gains of the antenna", "aim it at the grid, or give the beam an angle",
-                how=f"{how}: gains of the antenna have an error of {self.gains:.1g}",
-            )  # fmt: skip
-        if not self.coordinates <= ROUNDING * self.tolerance:
-            raise ToleranceUnreachable(
-                self.tolerance, best(), "float64 coordinates of a plane's pixels", NEAR_ORIGIN,
-                how=f"{how}: coordinates this large are rounded by {self.coordinates:.1g} rad of phase",
-            )  # fmt: skip
-        if not self.rounding <= ROUNDING * self.tolerance:
-            ratio = 20 * np.log10(self.energy.whole_profile)
-            dark = f"these pixels are {ratio:.0f} dB darker than what else is in the same rows"
-            raise ToleranceUnreachable(self.tolerance, best(), "rounding of float32 sums", how=f"{how}: {dark}")
+    def _planned(self, method: str, make_plan: Planner, engine: type[Engine], devices: DeviceClass) -> Candidate:
+        """The method with the plan for the tolerance that is left for it, or the planner's refusal.
 
-    def _offer(self, name: str, made: tuple[ImagePlan, Tiling], engine: type[Engine]) -> MethodChoice:
-        errors = {
-            "range profiles": self.near * float(made[0].predicted_error),
-            "rounding of float32 sums": self.rounding,
-            "float32 gains of the antenna": self.gains,
-        }
+        How the errors of few rows add up depends on the length of the plan's profiles: where they add up to more, less
+        of the tolerance is left, for another plan.
+        """
+        while True:
+            try:
+                plan, tiling = make_plan(self.task, self.inner, devices)
+            except ToleranceUnreachable as refusal:
+                return refusal
+            near = self.energy.darkness(plan.length)
+            if near <= self.near:
+                return self._choice(method, plan, tiling, engine)
+            self._divide_tolerance(near)
+
+    def _divide_tolerance(self, near: float) -> None:
+        """Set `inner`, what is left of the tolerance for a plan whose errors are `near` times those of its kernels."""
+        self.near = near
+        self.rounding = error_bounds.sum_rounding(tile_kernels.CHUNK, self.task.raw.n_samples) * max(
+            self.energy.whole_profile - near, 0.0
+        )
+        profiles_and_sums = np.sqrt(max(self.tolerance**2 - self.coordinates**2, 0.0))
+        self.inner = float(profiles_and_sums - self.rounding - self.gains) / near
+
+    def _choice(self, method: str, plan: ImagePlan, tiling: Tiling, engine: type[Engine]) -> MethodChoice:
+        errors = {"range profiles": self.near * float(plan.predicted_error), SUMS: self.rounding, GAINS: self.gains}
         terms = terms_of_sum(errors)
         if self.coordinates:
-            terms += (ErrorTerm("float64 coordinates of a plane's pixels", self.coordinates, NEAR_ORIGIN),)
+            terms += (ErrorTerm(COORDINATES, self.coordinates, NEAR_ORIGIN),)
         error = float(np.hypot(sum(errors.values()), self.coordinates))
-        return MethodChoice(name, *made, engine, min(error, self.tolerance), terms, made[0].cost)
+        return MethodChoice(method, plan, tiling, engine, min(error, self.tolerance), terms, plan.cost)
 
 
-def _direct(task: FocusingTask, tolerance: float, on: DeviceClass, float64: bool) -> MethodChoice:
+def _direct(task: FocusingTask, tolerance: float, devices: DeviceClass, float64: bool) -> Candidate:
     """The direct method, in complex64 where that meets the tolerance, else in complex128 where the devices can."""
     if tolerance >= LEAST_TOLERANCE:
-        try:
-            return _Float32(task, tolerance).direct(on)
-        except ToleranceUnreachable as refused:
-            remedy = _without_float64(task, float64)
-            if remedy and not refused.remedy:
-                raise refused.restated(tolerance, None, remedy) from None
-            if remedy:
-                raise
-    elif task.antenna is not None:
-        best = reachable(lambda t: _Float32(task, t).direct(on), LEAST_TOLERANCE)
-        raise ToleranceUnreachable(
-            tolerance, best, "float32 gains of the antenna", "give the beam an angle", how="with an antenna"
-        )
-    elif not float64:
-        best = reachable(lambda t: _direct(task, t, on, False), LEAST_TOLERANCE)
-        raise ToleranceUnreachable(tolerance, best, "float32", float64_direct.remedy(), how="without float64")
+        candidate = _Float32(task, tolerance).direct(devices)
+        if isinstance(candidate, MethodChoice):
+            return candidate
+        remedy = _without_float64(task, float64)
+        if remedy:
+            return candidate if candidate.remedy else candidate.restated(tolerance, None, remedy)
+    elif task.antenna is not None or not float64:
+        best = reachable(lambda t: _confirmed(_Float32(task, t).direct(devices)), LEAST_TOLERANCE)
+        limit, how = (GAINS, "with an antenna") if task.antenna is not None else ("float32", "without float64")
+        return ToleranceUnreachable(tolerance, best, limit, _without_float64(task, float64), how)
     return _float64(task, tolerance)
 
 
 def _without_float64(task: FocusingTask, float64: bool) -> str:
-    """What to do where complex64 cannot meet a tolerance and no sums in complex128 can be made; "": they can."""
+    """Remedy where complex64 cannot meet a tolerance and no sums in complex128 can be made; "": they can."""
     if task.antenna is not None:
         return "give the beam an angle"
     if not float64:
@@ -241,21 +247,22 @@ def _without_float64(task: FocusingTask, float64: bool) -> str:
     return float64_plan.too_long(task) or ""
 
 
-def _factorized(task: FocusingTask, tolerance: float, on: DeviceClass, float64: bool) -> MethodChoice:
+def _factorized(task: FocusingTask, tolerance: float, devices: DeviceClass, float64: bool) -> Candidate:
     """Sub-apertures, in complex64 alone. Where they cannot meet the tolerance, the best one is found by a search."""
-    try:
-        if tolerance < LEAST_TOLERANCE:
-            raise ToleranceUnreachable(tolerance, None, "float32 range profiles", how="with sub-apertures")
-        return _Float32(task, tolerance).factorized(on)
-    except ToleranceUnreachable as refused:
-        remedy, otherwise = "method='direct' can", ""
-        try:
-            _direct(task, tolerance, on, float64)
-        except ToleranceUnreachable as direct:
-            remedy = ""
-            otherwise = f"method='direct' cannot either{': ' if direct.remedy else ''}{direct.remedy}"
-        best = _search(lambda t: _Float32(task, t).factorized(on), max(tolerance, LEAST_TOLERANCE))
-        raise refused.restated(tolerance, best, remedy or (otherwise if best is None else "")) from None
+    candidate: Candidate = ToleranceUnreachable(tolerance, None, PROFILES, how="with sub-apertures")
+    if tolerance >= LEAST_TOLERANCE:
+        candidate = _Float32(task, tolerance).factorized(devices)
+    if isinstance(candidate, MethodChoice):
+        return candidate
+    direct = _direct(task, tolerance, devices, float64)
+    best = _search(lambda t: _confirmed(_Float32(task, t).factorized(devices)), max(tolerance, LEAST_TOLERANCE))
+    if isinstance(direct, MethodChoice):
+        remedy = "method='direct' can"
+    elif best is None:
+        remedy = f"method='direct' cannot either{': ' if direct.remedy else ''}{direct.remedy}"
+    else:
+        remedy = ""
+    return candidate.restated(tolerance, best, remedy)
 
 
 def _search(plan: Callable[[float], object], above: float) -> float | None:
@@ -264,7 +271,7 @@ def _search(plan: Callable[[float], object], above: float) -> float | None:
     Plans take long, so few are tried: each at twice the tolerance before, then one halfway back.
     """
 
-    def met(tolerance: float) -> bool:
+    def is_met(tolerance: float) -> bool:
         try:
             plan(tolerance)
         except ToleranceUnreachable:
@@ -272,19 +279,20 @@ def _search(plan: Callable[[float], object], above: float) -> float | None:
         return True
 
     failed, best = 0.0, rounded_up(above)
-    while not met(best):
+    while not is_met(best):
         if best >= LARGEST_TOLERANCE:
             return None
         failed, best = best, min(rounded_up(2 * best), LARGEST_TOLERANCE)
     middle = rounded_up(float(np.sqrt(best * failed))) if failed else best
-    return middle if middle < best and met(middle) else best
+    return middle if middle < best and is_met(middle) else best
 
 
-def _float64(task: FocusingTask, tolerance: float) -> MethodChoice:
+def _float64(task: FocusingTask, tolerance: float) -> Candidate:
     """The direct method in float64."""
-    plan, tiling = float64_plan.make_plan(task, tolerance)
+    try:
+        plan, tiling = float64_plan.make_plan(task, tolerance)
+    except ToleranceUnreachable as refusal:
+        return refusal
+    terms = terms_of_sum({"float64 range profiles": float(plan.predicted_error)})
     cost = cost_model.FLOAT64_UNIT * plan.cost / task.grid.size
-    return MethodChoice(
-        "direct", plan, tiling, float64_direct.DirectFloat64, plan.predicted_error,
-        terms_of_sum({"float64 range profiles": float(plan.predicted_error)}), cost,
-    )  # fmt: skip
+    return MethodChoice("direct", plan, tiling, float64_direct.DirectFloat64, plan.predicted_error, terms, cost)

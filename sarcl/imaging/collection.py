@@ -1,4 +1,4 @@
-"""What an image keeps of the data that it was made from, so that products can be written from it."""
+"""Fields that an image keeps of the data it was made from, so that products can be written from it."""
 
 from __future__ import annotations
 

@@ -40,31 +40,31 @@ def compress(raw: PhaseHistory, waveform: Waveform | None = None) -> PhaseHistor
         if plan != last:  # rows mostly share one frequency plan
             matched, last = np.conj(pulse.pulse_spectrum(plan[0] + plan[1] * n)), plan
         out[p] = samples[p] * matched
-    made = replace(raw, samples=sealed(out), waveform=pulse, compressed=True)
-    _check_contrast(made, raw, pulse)
-    return made
+    compressed = replace(raw, samples=sealed(out), waveform=pulse, compressed=True)
+    _check_contrast(compressed, raw, pulse)
+    return compressed
 
 
 def _check_contrast(made: PhaseHistory, raw: PhaseHistory, pulse: Waveform) -> None:
     """Warn where compression has spread the echoes: by a wrong chirp they become longer, not shorter."""
     rows = spread_over(raw.n_rows, SOME_ROWS)
-    here = _contrast([made.read(p, p + 1)[0] for p in rows])
+    level = _contrast([made.read(p, p + 1)[0] for p in rows])
     # the contrast of n samples of noise is 2, with a standard deviation of 2/sqrt(n)
     doubt = 10 / np.sqrt(len(rows) * raw.n_samples)
     other = 0.0
     if pulse.sweep_rate is not None:
         f = raw.frequency[rows, None] + raw.frequency_step[rows, None] * np.arange(raw.n_samples)
         other = _contrast([raw.read(p, p + 1)[0] * pulse.pulse_spectrum(f[i]) for i, p in enumerate(rows)])
-    if other > max(2 * here, NOISE + doubt):
+    if other > max(2 * level, NOISE + doubt):
         down = pulse.kind == "chirp"
         warn(
-            f"the compressed echoes have a contrast (mean square over squared mean of intensity) of {here:.3g}, and "
+            f"the compressed echoes have a contrast (mean square over squared mean of intensity) of {level:.3g}, and "
             f"{other:.3g} with a chirp of the other sign; noise has {NOISE:g}: the sweep that was sent probably "
             f"{'falls' if down else 'rises'}, give Waveform.chirp(..., down={down})"
         )
-    elif 0 < here < NOISE - doubt:
+    elif 0 < level < NOISE - doubt:
         warn(
-            f"the compressed echoes have a contrast (mean square over squared mean of intensity) of {here:.3g}, less "
+            f"the compressed echoes have a contrast (mean square over squared mean of intensity) of {level:.3g}, less "
             f"than the {NOISE:g} of noise: the pulse that was sent is probably another one; check the waveform's "
             "bandwidth, duration and sign, or give Waveform.sampled(...) of a replica"
         )
@@ -73,5 +73,5 @@ def _check_contrast(made: PhaseHistory, raw: PhaseHistory, pulse: Waveform) -> N
 def _contrast(rows: list[np.ndarray]) -> float:
     """Mean square over squared mean of the intensity in range, the average of rows that are not zero; 0 of none."""
     intensity = (np.abs(np.fft.ifft(row.astype(np.complex128))) ** 2 for row in rows if row.any())
-    found = [float(np.mean((i / i.max()) ** 2) / np.mean(i / i.max()) ** 2) for i in intensity]
-    return float(np.mean(found)) if found else 0.0
+    contrasts = [float(np.mean((i / i.max()) ** 2) / np.mean(i / i.max()) ** 2) for i in intensity]
+    return float(np.mean(contrasts)) if contrasts else 0.0

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..base import wgs84
 from ..base.constants import SPEED_OF_LIGHT
@@ -36,13 +38,13 @@ class DefaultGrid:
 def default_grid(
     raw: PhaseHistory,
     *,
-    center: Any = None,
-    shape: Any = None,
-    spacing: Any = None,
-    normal: Any = None,
-    x_axis: Any = None,
-    side: Any = None,
-    heights: Any = 0.0,
+    center: ArrayLike | None = None,
+    shape: int | Sequence[int] | None = None,
+    spacing: float | Sequence[float] | None = None,
+    normal: ArrayLike | None = None,
+    x_axis: ArrayLike | None = None,
+    side: str | None = None,
+    heights: float | ElevationModel = 0.0,
 ) -> DefaultGrid:
     """A plane (horizontal by default) for a phase history; arguments that are None are chosen from the data.
 
@@ -80,9 +82,9 @@ def default_grid(
         spacing = tuple(float(f"{d:.4g}") for d in cell / 2)
         why.append(f"pixels half the resolution of {cell[0]:.3g} x {cell[1]:.3g} m")
     if shape is None:
-        wanted = [max(1, 2 * round(swath / (2 * d))) for d in np.broadcast_to(spacing, 2)]
-        shape = [min(n, MOST) for n in wanted]
-        limit = "" if shape == wanted else f"{MOST} pixels at most of "
+        unambiguous = [max(1, 2 * round(swath / (2 * d))) for d in np.broadcast_to(spacing, 2)]
+        shape = [min(n, MOST) for n in unambiguous]
+        limit = "" if shape == unambiguous else f"{MOST} pixels at most of "
         why.append(f"{limit}the {swath:.4g} m that are unambiguous")
     return DefaultGrid(ImageGrid.plane(shape=shape, spacing=spacing, **axes), "; ".join(why))
 
@@ -109,7 +111,7 @@ def _spread(raw: PhaseHistory, x: np.ndarray) -> float:
     return float(np.sqrt(np.mean(_excess(raw, x)[0] ** 2)))
 
 
-def _center_on_earth(raw: PhaseHistory, side: Any, heights: Any) -> tuple[np.ndarray, str]:
+def _center_on_earth(raw: PhaseHistory, side: str | None, heights: float | ElevationModel) -> tuple[np.ndarray, str]:
     """The point at `heights` whose ranges to the antennas are the reference ranges, by least squares; and words."""
     if side is None:
         raise ValueError(
@@ -143,10 +145,7 @@ def _center(raw: PhaseHistory) -> tuple[np.ndarray, str]:
         x = _meet(raw, free)
         if x is not None and _spread(raw, x) <= float(raw.swath.min()) / 4:
             return np.round(x, 3), f"centre: {words}, to {_spread(raw, x):.2g} m"
-    return (
-        origin,
-        "centre: the origin, because the reference ranges meet in no point (--center names another)",
-    )
+    return (origin, "centre: the origin, because the reference ranges meet in no point (--center names another)")
 
 
 def _meet(raw: PhaseHistory, free: int) -> np.ndarray | None:

@@ -1,11 +1,11 @@
-"""What every method of focusing offers: a plan, and an engine that makes bands of the image on one device."""
+"""Base classes of the methods of focusing: a plan, and an engine that makes bands of the image on one device."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -16,7 +16,10 @@ from ..numerics.interpolation import Interpolator
 from ..opencl.device import Device
 from ..opencl.pipeline import Pipeline
 from .focusing_task import FocusingTask
-from .tiling.tiling import Run, Tiling
+from .tiling.tiling import FlatImage, Run, Tiling
+
+if TYPE_CHECKING:
+    from ..opencl.device import Buffer
 
 UPLOAD = 2**26  # bytes of samples of a block on a GPU: while it computes with these, the host uploads as many
 
@@ -42,7 +45,7 @@ class Skipped:
 
 
 class ImagePlan(Protocol):
-    """How a method makes an image. It depends on the task and the tolerance, never on the memory of a device."""
+    """Plan of an image by a method. It depends on the task and the tolerance, never on the memory of a device."""
 
     @property
     def predicted_error(self) -> float:
@@ -59,7 +62,7 @@ class ImagePlan(Protocol):
         """Samples of a range profile."""
         ...
 
-    def describe(self, method: str) -> dict[str, Any]:
+    def describe(self, method: str) -> dict[str, object]:
         """The plan in words and numbers, for a report."""
         ...
 
@@ -98,7 +101,7 @@ class Engine(ABC):
 
     @abstractmethod
     def fill(
-        self, first: int, last: int, flat: Any, budget: float, clock: Clock, on_progress: Callable[[float], None]
+        self, first: int, last: int, flat: FlatImage, budget: float, clock: Clock, on_progress: Callable[[float], None]
     ) -> Skipped:
         """Write the pixels of bands first ... last - 1 to their places in `flat` (ImageOutput.flat).
 
@@ -143,9 +146,14 @@ class RowProfiles:
     """
 
     def __init__(
-        self, device: Device, task: FocusingTask, interpolator: Interpolator, length: int, pad: int | None = None,
+        self,
+        device: Device,
+        task: FocusingTask,
+        interpolator: Interpolator,
+        length: int,
+        pad: int | None = None,
         dtype: type[np.complexfloating] = np.complex64,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.device, self.task, self.length, self.dtype = device, task, length, dtype
         self.pad = range_profiles.padding(interpolator) if pad is None else pad
         self.stride = length + 2 * self.pad
@@ -181,16 +189,16 @@ class RowProfiles:
         sample_bytes = self.task.raw.samples.dtype.itemsize * self.task.raw.n_samples
         return max(1, min(on_others, UPLOAD // sample_bytes))
 
-    def upload(self, start: int, stop: int) -> Any:
+    def upload(self, start: int, stop: int) -> Buffer:
         """Buffer of the profiles (stop - start, stride) of rows start ... stop - 1."""
         along = self.task.row_weight[start:stop]
         samples = self.task.raw.read(start, stop)
         if self._maker and self._maker.holds(samples, along):
-            given = self.pipeline.upload(samples), samples.dtype, self.pipeline.upload(self._maker.weights(along))
-            return self._maker.make(*given, stop - start)
+            buffer, weights = self.pipeline.upload(samples), self.pipeline.upload(self._maker.weights(along))
+            return self._maker.make(buffer, samples.dtype, weights, stop - start)
         weights = along[:, None] * self.sample_weight
-        made = range_profiles.from_samples(self.device, samples, weights, self.length, self.pad, self.dtype)
-        return self.pipeline.upload(made)
+        profiles = range_profiles.from_samples(self.device, samples, weights, self.length, self.pad, self.dtype)
+        return self.pipeline.upload(profiles)
 
     @property
     def _row_bytes(self) -> float:

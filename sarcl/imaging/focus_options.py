@@ -16,7 +16,7 @@ from ..numerics.run_options import RunOptions
 from ..numerics.windows import Window
 
 EXACT_PAIR = 3e-8  # s, of the exact sum, per sample and pixel
-CHEAP_CHECK = 0.02  # of the time of the image: a check that costs less is made without being asked for
+CHEAP_CHECK = 0.02  # share of the time of the image: a check that costs less is made by default
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -32,9 +32,7 @@ class FocusOptions(RunOptions):
     )
     weights: ArrayLike | None = option(None, "one per row (n_rows,), multiplied with window and raw.weight")
     out: PathLike | None = option(
-        None,
-        'None, or a path ending in ".h5": the image is written there when it is finished',
-        in_files=False,
+        None, 'None, or a path ending in ".h5": the image is written there when it is finished', in_files=False
     )
 
     def is_checked(self, pairs: float, seconds: float) -> bool:

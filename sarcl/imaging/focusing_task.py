@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -83,6 +83,11 @@ class FocusingTask:
         return float((self.raw.frequency + self.raw.n_samples * self.raw.frequency_step).max())
 
     @property
+    def bandwidth(self) -> float:
+        """Largest bandwidth of a row, Hz."""
+        return float(self.raw.bandwidth.max())
+
+    @property
     def skip_flags(self) -> int:
         """SKIP_WINDOW and SKIP_BEAM of the kernels."""
         return int("range window" in self.skips) + 2 * int("beam" in self.skips)
@@ -93,7 +98,7 @@ class FocusingTask:
         return self.raw.n_rows * self.grid.size
 
 
-def beam_of(raw: PhaseHistory, beam: Any, center: np.ndarray) -> tuple[np.ndarray | None, float]:
+def beam_of(raw: PhaseHistory, beam: object, center: np.ndarray) -> tuple[np.ndarray | None, float]:
     """Unit directions (n_rows, 3), or None where every point is seen, and full angle, rad, of `beam`.
 
     beam    None, an angle about the line from the transmitter to `center`, m (3,), or (angle, direction)
@@ -101,27 +106,27 @@ def beam_of(raw: PhaseHistory, beam: Any, center: np.ndarray) -> tuple[np.ndarra
     """
     if beam is None:
         return None, 2 * np.pi
-    pointed = isinstance(beam, (tuple, list))
-    if pointed and len(beam) != 2:
-        raise ValueError(f"beam has {len(beam)} parts; give an angle in rad, or (angle, direction)")
-    name = "beam[0]" if pointed else "beam"
-    angle = number(name, beam[0] if pointed else beam, above=0)
+    parts = beam if isinstance(beam, (tuple, list)) else None
+    if parts is not None and len(parts) != 2:
+        raise ValueError(f"beam has {len(parts)} parts; give an angle in rad, or (angle, direction)")
+    name = "beam" if parts is None else "beam[0]"
+    angle = number(name, beam if parts is None else parts[0], above=0)
     if angle > 2 * np.pi:
         raise ValueError(f"{name} is {angle:g} rad; a full angle is at most 2 pi: give radians")
-    if pointed:
-        given = converted("beam[1]", beam[1], np.float64)
-        if given.shape not in ((3,), (raw.n_rows, 3)):
-            raise ValueError(f"beam[1] has shape {given.shape}, wanted (3,) or one direction per row ({raw.n_rows}, 3)")
-        finite("beam[1]", given)
-        toward = np.broadcast_to(given, (raw.n_rows, 3))
+    if parts is not None:
+        axis = converted("beam[1]", parts[1], np.float64)
+        if axis.shape not in ((3,), (raw.n_rows, 3)):
+            raise ValueError(f"beam[1] has shape {axis.shape}, wanted (3,) or one direction per row ({raw.n_rows}, 3)")
+        finite("beam[1]", axis)
+        toward = np.broadcast_to(axis, (raw.n_rows, 3))
     else:
         toward = center - raw.tx
     largest = np.abs(toward).max(axis=1, keepdims=True)  # first, so that squares neither overflow nor vanish
     if not largest.all():
         row = int(np.argmin(largest))
-        if not pointed:
+        if parts is None:
             raise ValueError(f"tx[{row}] is at the grid's centre, so its beam points nowhere; give (angle, direction)")
-        which = f"[{row}]" if np.ndim(beam[1]) == 2 else ""
+        which = f"[{row}]" if np.ndim(parts[1]) == 2 else ""
         raise ValueError(f"beam[1]{which} is (0, 0, 0); a direction needs a length")
     if angle == 2 * np.pi:
         return None, angle
@@ -161,18 +166,26 @@ def make_task(
     if "no data" not in skips:
         grid = grid.filled()
     return FocusingTask(
-        raw, grid, geometry_of(raw, wrap, toward, angle), sample_weight, row_weight, wrap, frozenset(skips), taper,
-        None if taper is None else places_of(raw), antenna,
-    )  # fmt: skip
+        raw=raw,
+        grid=grid,
+        antennas=geometry_of(raw, wrap, toward, angle),
+        sample_weight=sample_weight,
+        row_weight=row_weight,
+        wrap=wrap,
+        skips=frozenset(skips),
+        taper=taper,
+        places=None if taper is None else places_of(raw),
+        antenna=antenna,
+    )
 
 
 def _all_lit(antennas: PulseGeometry, grid: ImageGrid) -> bool:
     """Whether every row sees the whole sphere about the grid."""
     low, high = grid.bounds
     middle, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2 * (1 + 1e-9)
-    depth = antennas.beam_depth(middle) if antennas.wrap else np.minimum(
-        antennas.beam_depth(middle), antennas.depth(middle)
-    )  # fmt: skip
+    depth = antennas.beam_depth(middle)
+    if not antennas.wrap:
+        depth = np.minimum(depth, antennas.depth(middle))
     return bool((depth > radius).all())
 
 
@@ -181,15 +194,20 @@ def places_of(raw: PhaseHistory) -> np.ndarray:
 
     Channels of fewer rows than the longest are stretched to its length, so that all share an aperture.
     """
+    channels = _channels(raw)
+    longest, places = max(len(rows) for rows in channels), np.zeros(raw.n_rows)
+    for rows in channels:
+        stretched = (np.arange(len(rows)) + 0.5) / len(rows) * longest - 0.5
+        places[rows] = stretched if len(rows) < longest else np.arange(longest)
+    return places
+
+
+def _channels(raw: PhaseHistory) -> list[np.ndarray]:
+    """Rows of each channel and polarisation, in the order of time."""
     when = np.arange(raw.n_rows) if raw.time is None else np.argsort(np.argsort(raw.time, kind="stable"))
     group = groups(raw.n_rows, raw.tx_channel, raw.rx_channel, raw.polarization)
-    longest = int(np.bincount(group).max())
-    made = np.zeros(raw.n_rows)
-    for g in np.unique(group):
-        members = np.flatnonzero(group == g)
-        at = (np.arange(len(members)) + 0.5) / len(members) * longest - 0.5
-        made[members[np.argsort(when[members])]] = at if len(members) < longest else np.arange(longest)
-    return made
+    members = (np.flatnonzero(group == g) for g in np.unique(group))
+    return [rows[np.argsort(when[rows])] for rows in members]
 
 
 def check_polarizations(
@@ -221,11 +239,8 @@ def weigh(raw: PhaseHistory, window: Window | None, weights: ArrayLike | None) -
     across, along = windows.both(window)
     rows = np.ones(raw.n_rows)
     if along is not None:
-        when = np.arange(raw.n_rows) if raw.time is None else np.argsort(np.argsort(raw.time, kind="stable"))
-        group = groups(raw.n_rows, raw.tx_channel, raw.rx_channel, raw.polarization)
-        for g in np.unique(group):
-            members = np.flatnonzero(group == g)
-            rows[members[np.argsort(when[members])]] = windows.weights(along, len(members))
+        for channel in _channels(raw):
+            rows[channel] = windows.weights(along, len(channel))
     if raw.weight is not None:
         rows = rows * raw.weight
     if weights is not None:
@@ -243,6 +258,15 @@ def geometry_of(
     """The geometry of every row; the carrier is the frequency of sample n_samples//2; beam as of `beam_of`."""
     half = UNLIMITED if wrap else SPEED_OF_LIGHT / (4 * raw.frequency_step)
     return PulseGeometry.sampled(
-        raw.tx, raw.rx, raw.reference_range, first=raw.frequency, step=raw.frequency_step, n_samples=raw.n_samples,
-        near=-half, far=half, wrap=wrap, beam=beam, beam_angle=beam_angle,
-    )  # fmt: skip
+        raw.tx,
+        raw.rx,
+        raw.reference_range,
+        first=raw.frequency,
+        step=raw.frequency_step,
+        n_samples=raw.n_samples,
+        near=-half,
+        far=half,
+        wrap=wrap,
+        beam=beam,
+        beam_angle=beam_angle,
+    )

@@ -84,9 +84,13 @@ def _rate(devices: list[Device]) -> float:
 
 
 def _cheaper(
-    task: FocusingTask, options: BackprojectOptions, devices: list[Device], chosen: MethodChoice, seconds: float,
+    task: FocusingTask,
+    options: BackprojectOptions,
+    devices: list[Device],
+    chosen: MethodChoice,
+    seconds: float,
     besides: float,
-) -> tuple[float, float] | None:  # fmt: skip
+) -> tuple[float, float] | None:
     """Predicted error and seconds of the most accurate plan that costs noticeably less.
 
     seconds  per unit of work;  besides  seconds that do not depend on the plan's work
@@ -125,12 +129,12 @@ def speed(device: Device) -> float:
     side = 128
     while True:
         task = make_task(raw, ImageGrid.plane(shape=(side, side), spacing=0.3), None, None, False, True)
-        made, tiling = direct.make_plan(task, 0.1, DeviceClass(lanes=False))
-        engine, out = direct.Direct(device, task, made, tiling), np.empty((side, side), np.complex64)
+        plan, tiling = direct.make_plan(task, 0.1, DeviceClass(lanes=False))
+        engine, out = direct.Direct(device, task, plan, tiling), np.empty((side, side), np.complex64)
         clock = Clock()
         engine.fill(0, tiling.n_bands, out, 2**28, clock, lambda rows: None)  # builds the kernels, warms up
         clock, start = Clock(), time.perf_counter()
         engine.fill(0, tiling.n_bands, out, 2**28, clock, lambda rows: None)
         if time.perf_counter() - start > PROBE or side >= 4096:
-            return task.pairs * made.cost / clock.seconds["backproject"]
+            return task.pairs * plan.cost / clock.seconds["backproject"]
         side *= 2

@@ -10,7 +10,7 @@ Kernels: kernels/pixel_weights.clh.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,7 +18,10 @@ from ..opencl.device import Device
 from ._row_coverage import RowCoverage
 from .focusing_task import FocusingTask
 
-CELLS = 2**14  # of a table in float32
+if TYPE_CHECKING:
+    from ..opencl.device import Buffer
+
+CELLS = 2**14  # cells of a table in float32
 WEIGHT_BUFFERS = 3  # of weights, among a kernel's arguments: any others stand in their places where there are none
 PIECE = 2**20  # pairs of a pixel and a row whose weights are added up together
 
@@ -61,20 +64,20 @@ class PixelTaper:
         start, inverse = self.apertures(positions)
         alike = task.row_weight.min() == task.row_weight.max() and len(np.unique(task.places)) == len(task.places)
         plain = alike & (np.rint(1 / inverse) == count)
-        known = {0: 0.0}
+        sum_of_count = {0: 0.0}
         for n in np.unique(count[plain]).astype(int):
-            known[n] = float(self.read((np.arange(n) + 0.5) / max(n, 1)).sum() * task.row_weight[0])
-        numbers = np.array(sorted(known))
-        sums = np.array([known[n] for n in numbers])
-        made = sums[np.searchsorted(numbers, np.where(plain, count, 0).astype(int))]
+            sum_of_count[n] = float(self.read((np.arange(n) + 0.5) / max(n, 1)).sum() * task.row_weight[0])
+        numbers = np.array(sorted(sum_of_count))
+        sums = np.array([sum_of_count[n] for n in numbers])
+        gains = sums[np.searchsorted(numbers, np.where(plain, count, 0).astype(int))]
         others = np.argwhere(~plain)
         step, rows = max(1, PIECE // task.raw.n_rows), np.arange(task.raw.n_rows)
         for at in range(0, len(others), step):
             tile, pixel = others[at : at + step].T
             seen = RowCoverage(task).sees(positions[tile, pixel], rows).T
             u = (task.places - start[tile, pixel, None]) * inverse[tile, pixel, None]
-            made[tile, pixel] = (seen * self.read(u)) @ task.row_weight
-        return made
+            gains[tile, pixel] = (seen * self.read(u)) @ task.row_weight
+        return gains
 
     def read(self, u: np.ndarray) -> np.ndarray:
         """W at u, of any shape."""
@@ -103,13 +106,13 @@ class TaperOnDevice:
         """Bytes on the device per pixel."""
         return 0 if self.table is None else 2 * np.dtype(self.kind).itemsize
 
-    def apertures(self, positions: np.ndarray) -> Any:
+    def apertures(self, positions: np.ndarray) -> Buffer | None:
         """Buffer of start and inverse (2, pixels) of positions, m (n_tiles, per_tile, 3); None without a taper."""
         if self.table is None:
             return None
         return self.device.upload(PixelTaper(self.task).apertures(positions).astype(self.kind))
 
-    def arguments(self, apertures: Any, start: int, stop: int) -> tuple[Any, ...]:
+    def arguments(self, apertures: Buffer | None, start: int, stop: int) -> tuple[Buffer | None, ...]:
         """The kernel's arguments of rows start ... stop - 1: place, taper, aperture; none without a taper."""
         if self.table is None or self.task.places is None:
             return ()

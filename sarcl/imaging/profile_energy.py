@@ -24,7 +24,7 @@ ROWS, PIXELS, MOST = 16, 256, 2**18  # rows and pixels in the estimate; samples 
 FEW = 64  # rows of which all are read, as their errors may add up in phase
 ALL = 2**28  # samples up to which every row is read
 IN_CACHE = 2**16  # samples whose squares are made at a time, so that they stay in a cache
-TAPS, FINER, TERMS = 12, 4.0, 6  # of an interpolator with an error of 1e-11
+TAPS, FINER, TERMS = 12, 4.0, 6  # taps, oversampling and terms of an interpolator with an error of 1e-11
 CHANCE, CHANCE_OF_FEW = 1.25, 1.12  # what noise in many pixels makes of `near`, which is 1
 INNER = 0.5  # share of a kernel's largest error that most kernels keep to in the inner half of the band
 BESIDE = TAPS + 2  # samples beside a pixel: those that an interpolation reads, and one more on each side
@@ -99,22 +99,23 @@ def _estimate(task: FocusingTask) -> ProfileEnergy:
         delays, inside = _delays(task, x, row)
         gains = None if task.antenna is None else task.antenna.weights(x[inside], row, task.antenna.frequency)
         values, about, beside = _values(samples / scale, shaped, length, delays[inside])
-        here, close = np.abs(values) ** 2, (np.abs(about) ** 2).mean(axis=1)
+        power, close = np.abs(values) ** 2, (np.abs(about) ** 2).mean(axis=1)
         if gains is not None:
-            here, close = here * np.abs(gains) ** 2, close * np.abs(gains) ** 2
-        pixel_power += stands_for[row] * float(here.sum())
+            power, close = power * np.abs(gains) ** 2, close * np.abs(gains) ** 2
+        pixel_power += stands_for[row] * float(power.sum())
         near += stands_for[row] * float(close.sum())
         pixels_inside += stands_for[row] * int(inside.sum()) / raw.n_rows
         if together is not None:
             cycles = delays * (raw.frequency[row] / raw.frequency_step[row] + n // 2)
-            together.add(row, inside, delays, cycles, values, beside, 1.0 if gains is None else gains.conj())
+            factors = np.exp(2j * np.pi * (cycles[inside] % 1)) * (1.0 if gains is None else gains.conj())
+            together.add(row, inside, delays, factors * values, factors[:, None] * beside)
     peak = 1.0 if task.antenna is None else task.antenna.peak
-    whole = pixels_inside * float(((bright / scale) ** 2).sum()) * peak**2
-    if whole == 0 or near == 0:
+    total_power = pixels_inside * float(((bright / scale) ** 2).sum()) * peak**2
+    if total_power == 0 or near == 0:
         return ProfileEnergy(1.0, 1.0)
-    floor = 1e-20 * whole  # where every pixel is at an exact null of every row
+    floor = 1e-20 * total_power  # where every pixel is at an exact null of every row
     return ProfileEnergy(
-        float(np.sqrt(near / max(pixel_power, floor))), float(np.sqrt(whole / max(pixel_power, floor))), together
+        float(np.sqrt(near / max(pixel_power, floor))), float(np.sqrt(total_power / max(pixel_power, floor))), together
     )
 
 
@@ -140,9 +141,9 @@ def row_norms(task: FocusingTask) -> np.ndarray:
 
 def _weighted_norms(samples: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """Norms of rows (n, n_samples), float64; weight (2 n_samples,): on the squares of real and imaginary parts."""
-    given = samples.view(samples.real.dtype)
-    largest = max(float(given.max(initial=0.0)), -float(given.min(initial=0.0)))
-    parts = given.astype(np.float64)
+    real_and_imaginary = samples.view(samples.real.dtype)
+    largest = max(float(real_and_imaginary.max(initial=0.0)), -float(real_and_imaginary.min(initial=0.0)))
+    parts = real_and_imaginary.astype(np.float64)
     if 1e-100 < largest < 1e100:
         largest = 1.0
     elif largest:  # squares leave the range of float64
@@ -177,16 +178,16 @@ def _values(
 
     shaped  (n_samples,): what makes up for the kernel's transform
     """
-    made = deconvolved(TAPS, FINER, TERMS, np.float64)
+    kernel = deconvolved(TAPS, FINER, TERMS, np.float64)
     weights = np.stack([shaped, np.ones(len(samples)), shaped * _edge_weights(len(samples))])
     profile, plain, weighted = range_profiles.from_samples(None, samples[None], weights, length, dtype=np.complex128)
-    place = delays * length - (made.taps - 1) / 2
+    place = delays * length - (kernel.taps - 1) / 2
     first = np.rint(place).astype(np.int64)
-    taps = (first[:, None] + np.arange(made.taps)) % length
-    shares = made.weights(place - first)
+    taps = (first[:, None] + np.arange(kernel.taps)) % length
+    shares = kernel.weights(place - first)
     values = (shares * profile[taps]).sum(axis=1)
-    read = weighted[(first[:, None] + np.arange(-BESIDE // 2, BESIDE // 2 + made.taps - 1)) % length]
-    beside = sliding_window_view(read, made.taps, axis=1) @ shares[:, :, None]
+    read = weighted[(first[:, None] + np.arange(-BESIDE // 2, BESIDE // 2 + kernel.taps - 1)) % length]
+    beside = sliding_window_view(read, kernel.taps, axis=1) @ shares[:, :, None]
     return values, plain[(first[:, None] + np.arange(-1, BESIDE - 1)) % length], beside[..., 0]
 
 

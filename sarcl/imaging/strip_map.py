@@ -93,13 +93,13 @@ def doppler_centroid(raw: PhaseHistory, *, near: float = 0.0) -> float:
     total, before = 0j, raw.read(first, first + 1)[0].astype(np.complex128)
     n = np.arange(raw.n_samples)
     for row in range(first + 1, last):
-        here = raw.read(row, row + 1)[0].astype(np.complex128)
+        samples = raw.read(row, row + 1)[0].astype(np.complex128)
         moved = raw.reference_range[row] - raw.reference_range[row - 1]
         frequency = raw.frequency[row] + n * raw.frequency_step[row]
-        total += complex(np.vdot(before, here * np.exp(-4j * np.pi * moved / SPEED_OF_LIGHT * frequency)))
-        before = here
+        total += complex(np.vdot(before, samples * np.exp(-4j * np.pi * moved / SPEED_OF_LIGHT * frequency)))
+        before = samples
     if total == 0:
         raise ValueError("the echoes are zero, and have no Doppler centroid")
     rate = float(1 / steps.mean())
-    found = float(np.angle(total)) / (2 * np.pi) * rate
-    return found + rate * float(np.rint((near - found) / rate))
+    centroid = float(np.angle(total)) / (2 * np.pi) * rate
+    return centroid + rate * float(np.rint((near - centroid) / rate))

@@ -79,15 +79,15 @@ def unseen_pixels(task: FocusingTask) -> UnseenPixels | None:
     _, x = task.grid.sample(PIXELS, seed=2)
     rows = spread_over(raw.n_rows, ROWS)
     first = rows[spread_over(len(rows), FIRST)]
-    left, nearest = np.arange(len(x)), np.full(len(x), np.inf)
+    unseen, nearest = np.arange(len(x)), np.full(len(x), np.inf)
     farthest = np.zeros(len(x))
     for row in (*first, *np.setdiff1d(rows, first)):
-        if len(left) == 0:
+        if len(unseen) == 0:
             return None
-        path = half_path(raw.tx[row], raw.rx[row], x[left])
-        nearest[left], farthest[left] = np.minimum(nearest[left], path), np.maximum(farthest[left], path)
-        left = left[np.abs(path - raw.reference_range[row]) > half[row] * (1 + 1e-9)]
-    if len(left) == 0:
+        path = half_path(raw.tx[row], raw.rx[row], x[unseen])
+        nearest[unseen], farthest[unseen] = np.minimum(nearest[unseen], path), np.maximum(farthest[unseen], path)
+        unseen = unseen[np.abs(path - raw.reference_range[row]) > half[row] * (1 + 1e-9)]
+    if len(unseen) == 0:
         return None
     window = float((raw.reference_range - half).min()), float((raw.reference_range + half).max())
-    return UnseenPixels(len(left), len(x), (float(nearest[left].min()), float(farthest[left].max())), window)
+    return UnseenPixels(len(unseen), len(x), (float(nearest[unseen].min()), float(farthest[unseen].max())), window)

@@ -8,7 +8,7 @@ import threading
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,6 +19,9 @@ from ._launches import Launches, fixed_axes
 from ._programs import build, kernels_of, names_in, quiet, source
 from .device_list import DeviceInfo
 from .failures import buffer_bytes, explained
+
+if TYPE_CHECKING:
+    from pyopencl import Buffer as Buffer  # what upload, zeros and empty return, for annotations
 
 # A launch of a struct and 16 buffers takes 33 us of processor time, and 23 us once pyopencl is told the struct's type;
 # one of 17 single numbers took 84 us untold. Telling it takes 0.4 ms, which kernels of few launches do not save.

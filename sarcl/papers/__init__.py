@@ -55,12 +55,12 @@ def open_lab(
     paper: Paper, device: DeviceChoice | None = None, quick: bool = False, folder: Path | None = None,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Any:  # fmt: skip
-    """What the sections of a paper share, with its OpenCL device opened.
+    """Lab that the sections of a paper share, with its OpenCL device opened.
 
     quick     less of it (`Paper.quick`)
     folder    where long runs are kept (`Paper.long`);  progress  called as progress(stage, done, total) by these
     """
     from ..opencl.choose_device import open_device
 
-    given: dict[str, Any] = {"folder": folder, "progress": progress} if paper.long else {}
-    return paper.lab(open_device(device), quick, **given)
+    options: dict[str, Any] = {"folder": folder, "progress": progress} if paper.long else {}
+    return paper.lab(open_device(device), quick, **options)

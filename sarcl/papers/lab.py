@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from ..figures import html
 from ..model.image_grid import ImageGrid
+from ..opencl.device import DeviceChoice
 from ..scene.scene import Scene
 from .far_radar import FarRadar
 
@@ -20,7 +19,7 @@ class Lab:
     device  an OpenCL device;  quick  smaller fields and fewer looks
     """
 
-    def __init__(self, device: Any = None, quick: bool = False) -> None:
+    def __init__(self, device: DeviceChoice | None = None, quick: bool = False) -> None:
         self.device, self.quick = device, quick
 
     def looks(

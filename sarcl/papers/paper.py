@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import functools
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Any, Literal
+from typing import Any, Concatenate, Literal, ParamSpec
 
 import numpy as np
 
+from ..figures import html
 from ..figures.html import Block, heading, listed, page, table, terms, words
 
 Basis = Literal["paper", "geometry", "theory"]
@@ -47,7 +49,7 @@ class Row:
     measured: str
     holds: bool
     why: str = ""
-    value: Any = None
+    value: object = None
     rule: str = ""
     cause: Cause = ""
     basis: Basis = "paper"
@@ -57,6 +59,19 @@ class Row:
         out = asdict(self)
         del out["rule"]
         return {"published" if name == "expected" and self.basis == "paper" else name: out[name] for name in out}
+
+
+P = ParamSpec("P")
+
+
+def _adding(block: Callable[P, Block]) -> Callable[Concatenate[Section, P], None]:
+    """A method that adds a block to a section, with the arguments of the function that makes the block."""
+
+    @functools.wraps(block)
+    def add(section: Section, /, *args: P.args, **options: P.kwargs) -> None:
+        section.parts.append(block(*args, **options))
+
+    return add
 
 
 @dataclass
@@ -75,13 +90,13 @@ class Section:
         form: str = ".3f", why: str = "", cause: Cause = "", *, basis: Basis = "paper",
     ) -> None:  # fmt: skip
         """A row that holds where `measured` lies within `within` of the expected number."""
-        wanted, value = (f"{v:{form}} {unit}".strip() for v in (expected, measured))
+        printed, value = (f"{v:{form}} {unit}".strip() for v in (expected, measured))
         holds, rule = bool(abs(measured - expected) <= within), f"within {within:.3g} {unit}".strip()
         cause = "" if holds else cause
-        self.rows.append(Row(item, source, wanted, value, holds, why, plain(measured), rule, cause, basis))
+        self.rows.append(Row(item, source, printed, value, holds, why, plain(measured), rule, cause, basis))
 
     def states(
-        self, item: str, source: str, expected: str, measured: str, holds: Any, why: str = "", value: Any = None,
+        self, item: str, source: str, expected: str, measured: str, holds: object, why: str = "", value: object = None,
         *, rule: str, cause: Cause = "", basis: Basis = "paper",
     ) -> None:  # fmt: skip
         """A row for a statement in words. `holds`: whether the measured value agrees, by the criterion `rule`."""
@@ -96,7 +111,9 @@ class Section:
         """Figures."""
         self.parts += figures
 
-    def keep(self, **numbers: Any) -> None:
+    plot, picture, table = _adding(html.plot), _adding(html.picture), _adding(html.table)
+
+    def keep(self, **numbers: object) -> None:
         """Numbers behind the figures, six digits of each."""
         self.numbers |= {name: plain(value) for name, value in numbers.items()}
 
@@ -128,7 +145,7 @@ class Paper:
     main: tuple[str, ...] = ()
     long: bool = False
 
-    def run(self, lab: Any) -> Iterator[Section]:
+    def run(self, lab: object) -> Iterator[Section]:
         """Its sections, one after the other, timed; lab: as `self.lab` makes it."""
         for make in self.sections:
             start = time.monotonic()
@@ -180,7 +197,7 @@ class Paper:
 
 
 def _conclusion(published: list[Row], others: list[Row]) -> list[Block]:
-    """How many rows agree: those of the paper, and those whose values it does not print."""
+    """Numbers of rows that agree: those of the paper, and those whose values it does not print."""
     different = [row for row in published if not row.holds]
     blocks = [
         heading("Conclusion"),
@@ -195,10 +212,11 @@ def _conclusion(published: list[Row], others: list[Row]) -> list[Block]:
             blocks += [words(f"{meaning} ({len(of_cause)})."), listed([_in_words(row) for row in of_cause])]
     if others:
         wrong = [row for row in others if not row.holds]
-        blocks.append(words(
-            f"{len(others) - len(wrong)} of {len(others)} further values, which the paper does not print, agree with "
-            f"geometry or theory{':' if wrong else '.'}"
-        ))  # fmt: skip
+        n_right = len(others) - len(wrong)
+        text = (
+            f"{n_right} of {len(others)} further values, which the paper does not print, agree with geometry or theory"
+        )
+        blocks.append(words(f"{text}{':' if wrong else '.'}"))
         blocks += [listed([_in_words(row) for row in wrong])] if wrong else []
     return blocks
 
@@ -236,7 +254,7 @@ def _cells(row: Row) -> list[str]:
     return [row.item, f"{row.expected} ({_source(row)})", row.measured, row.rule, verdict]
 
 
-def plain(value: Any) -> Any:
+def plain(value: object) -> Any:  # what JSON takes
     """Numbers as JSON takes them, floats of six digits; NaN and Inf as None."""
     if isinstance(value, dict):
         return {str(k): plain(v) for k, v in value.items()}

@@ -17,7 +17,7 @@ from . import _bright_points, _phase_gradient, _phase_smoothing
 from ._bright_points import Beam
 from ._narrow_aperture import narrow_pulses
 
-TOLERANCE = 1e-2  # of images in which bright points are chosen
+TOLERANCE = 1e-2  # tolerance of images in which bright points are chosen
 LAGS = np.arange(-4, 5) / 2  # range cells from a point
 NO_LAG = np.zeros(1)
 WINDOW = 64.0  # Doppler cells about a point that sharpness is computed over, after the first passes
@@ -114,8 +114,8 @@ class ApertureView:
         for rows in parts:
             beam = None if self.beam is None else (self.beam[0], self.beam[1][rows])
             part = raw if len(parts) == 1 else raw[rows]
-            made = pixels_alone(part, self.grid, tolerance=TOLERANCE, beam=beam, **self.options)
-            power += (np.abs(made) / self.scale) ** 2
+            pixels = pixels_alone(part, self.grid, tolerance=TOLERANCE, beam=beam, **self.options)
+            power += (np.abs(pixels) / self.scale) ** 2
         if not power.any():
             raise ValueError(
                 "the image on this grid is zero everywhere: no pixel lies inside the range window of a pulse; "
@@ -147,8 +147,8 @@ class ApertureView:
 
         taper  True: with a Hamming window over the band, so that a target has no side lobes at other ranges
         """
-        made = _bright_points.contributions(self.corrected(errors), places, lags, self.scale, taper, self.beam)
-        return made.reshape(self.n, -1, len(lags))
+        terms = _bright_points.contributions(self.corrected(errors), places, lags, self.scale, taper, self.beam)
+        return terms.reshape(self.n, -1, len(lags))
 
     def values(self, errors: Errors, places: np.ndarray) -> np.ndarray:
         """Contributions to probes with all their lags as columns, (n, columns)."""
@@ -167,11 +167,11 @@ class ApertureView:
         if not self.alive.all():
             there = np.flatnonzero(self.alive)
             phase = np.interp(np.arange(self.n), there, np.unwrap(phase[there]))
-        left = _phase_smoothing.detrended(phase, self.shift_phase[:, 0])
+        residual = _phase_smoothing.detrended(phase, self.shift_phase[:, 0])
         if shift.any():
-            shift = shift - self.implied_range(phase - left)
+            shift = shift - self.implied_range(phase - residual)
             shift = shift - shift.mean()
-        return left, shift
+        return residual, shift
 
     def implied_range(self, phase: np.ndarray) -> np.ndarray:
         """The range error, m, of a motion that causes this phase error: -c phase/(4 pi f)."""

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..base.constants import SPEED_OF_LIGHT
 from ..base.rows import groups
@@ -16,7 +15,7 @@ from ..numerics.pulse_geometry import half_path
 from ..opencl import fft
 
 CANDIDATES = 50_000  # brightest pixels from which points are chosen
-OVERSAMPLE = 8  # of profiles read linearly: an error of 0.6 %, different at each point
+OVERSAMPLE = 8  # oversampling of profiles read linearly: an error of 0.6 %, different at each point
 ROWS = 64  # rows whose profiles are made together: bounds the memory
 PAD = 2  # samples of a profile that repeat its other end
 VALUES = 2**15  # per array operation: they fit in a processor's cache
@@ -38,22 +37,18 @@ def in_pulses(raw: PhaseHistory) -> np.ndarray:
     channel = groups(raw.n_rows, raw.tx_channel, raw.rx_channel, raw.polarization)
     rows = np.full((pulse.max() + 1, channel.max() + 1), -1)
     for row in range(raw.n_rows):
-        at = pulse[row], channel[row]
-        if rows[at] >= 0:
+        place = pulse[row], channel[row]
+        if rows[place] >= 0:
             what = "equal antenna positions and no time" if raw.time is None else f"time {raw.time[row]:.9g} s"
             raise ValueError(
-                f"rows {rows[at]} and {row} have {what}, and the same channel and polarization; give every pulse "
+                f"rows {rows[place]} and {row} have {what}, and the same channel and polarization; give every pulse "
                 "its own time, or name the channels"
             )
-        rows[at] = row
+        rows[place] = row
     if (rows < 0).any():
         pulse_at, channel_at = (int(i) for i in np.argwhere(rows < 0)[0])
         there = rows[:, channel_at].max()
-        names = {
-            "tx_channel": raw.tx_channel,
-            "rx_channel": raw.rx_channel,
-            "polarization": raw.polarization,
-        }
+        names = {"tx_channel": raw.tx_channel, "rx_channel": raw.rx_channel, "polarization": raw.polarization}
         lacking = ", ".join(f"{k} {v[there]}" for k, v in names.items() if v is not None)
         raise ValueError(
             f"pulse {pulse_at} has no row of {lacking}, other pulses have; autofocus estimates one phase per pulse "
@@ -101,10 +96,7 @@ def brightest(raw: PhaseHistory, power: np.ndarray, grid: ImageGrid, width: floa
     """
     places = pixels(power, grid, CANDIDATES)
     first, middle, last = (delay(raw, row, places) for row in (0, raw.n_rows // 2, raw.n_rows - 1))
-    cells = np.stack(
-        [middle * raw.bandwidth[0], (last - first) * raw.center_frequency[0] / width],
-        axis=1,
-    )
+    cells = np.stack([middle * raw.bandwidth[0], (last - first) * raw.center_frequency[0] / width], axis=1)
     boxes = np.floor(cells).astype(np.int64)
     names = boxes @ np.array([2**32, 1])
     taken: dict[tuple[int, int], np.ndarray] = {}
@@ -124,14 +116,14 @@ def brightest(raw: PhaseHistory, power: np.ndarray, grid: ImageGrid, width: floa
 def phasor(cycles: np.ndarray) -> np.ndarray:
     """exp(+j 2 pi cycles), complex64, of cycles in float64: what is left of a turn is rounded to float32."""
     angle = (2 * np.pi * (cycles - np.rint(cycles))).astype(np.float32)
-    made = np.empty(angle.shape, np.complex64)
-    np.cos(angle, out=made.real)
-    np.sin(angle, out=made.imag)
-    return made
+    phasors = np.empty(angle.shape, np.complex64)
+    np.cos(angle, out=phasors.real)
+    np.sin(angle, out=phasors.imag)
+    return phasors
 
 
 def contributions(
-    raw: PhaseHistory, places: np.ndarray, lags: Any, scale: float, taper: bool = False, beam: Beam | None = None
+    raw: PhaseHistory, places: np.ndarray, lags: ArrayLike, scale: float, taper: bool = False, beam: Beam | None = None
 ) -> np.ndarray:
     """v_p(x)/scale at points x, m (n, 3), and at lags behind them in range: complex64 (n_rows, n, n_lags).
 
@@ -154,14 +146,14 @@ def contributions(
 
         def fill(first: int, start: int = start, stop: int = stop, profiles: np.ndarray = profiles) -> None:
             rows = np.arange(first, min(first + few, stop))
-            lit: Any = slice(None)
-            if beam is not None:
-                seen = _sees(raw.tx[rows], places, (beam[0], beam[1][rows]))
-                lit = np.flatnonzero(seen.any(axis=0))
-            read = _read(raw, rows, places[lit], lags, profiles[rows - start], length)
-            if beam is not None:
-                read *= seen[:, lit, None]
-            out[rows[0] : rows[-1] + 1, lit] = read
+            pulses = slice(rows[0], rows[-1] + 1)
+            if beam is None:
+                out[pulses] = _read(raw, rows, places, lags, profiles[rows - start], length)
+                return
+            is_seen = _sees(raw.tx[rows], places, (beam[0], beam[1][rows]))
+            lit = np.flatnonzero(is_seen.any(axis=0))
+            terms = _read(raw, rows, places[lit], lags, profiles[rows - start], length)
+            out[pulses, lit] = terms * is_seen[:, lit, None]
 
         of_each(fill, range(start, stop, few))
     return out

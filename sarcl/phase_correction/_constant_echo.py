@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -51,6 +50,6 @@ class _Less(RowsOnDemand):
         self.raw, self.mean = raw, mean
         self.shape, self.dtype = raw.samples.shape, np.dtype(np.complex64)
 
-    def rows(self, some: slice) -> Any:
-        own = self.mean[np.arange(some.start, some.stop) % len(self.mean)] * _late(self.raw, some)
-        return (np.asarray(self.raw.samples[some]) - own).astype(np.complex64)
+    def rows(self, some: slice) -> np.ndarray:
+        constant = self.mean[np.arange(some.start, some.stop) % len(self.mean)] * _late(self.raw, some)
+        return (np.asarray(self.raw.samples[some]) - constant).astype(np.complex64)

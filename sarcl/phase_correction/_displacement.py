@@ -19,19 +19,19 @@ from . import _bright_points
 from ._aperture_view import NO_LAG, ApertureView, Errors
 
 BRIGHT = 10  # brightest points of an image
-FAINT = 0.1  # of the power of the brightest: fainter points may be side lobes
-SEEN = 0.25  # of a place's largest amplitude: pulses with less at either end of the aperture do not see the place
+FAINT = 0.1  # share of the power of the brightest point: fainter ones may be side lobes
+SEEN = 0.25  # share of a place's largest amplitude: pulses with less at either end of the aperture do not see it
 AVERAGED = 8  # parts of the aperture over which amplitudes are averaged: noise and neighbours cancel
 # share of the pulses that could see a place: with more, all of them do. Echoes of neighbours, a few Doppler cells
 # beside the place, hide as much of it at the ends of the aperture
 MOST = 0.75
-FITS = 4  # of a slope
+FITS = 4  # fits of a slope
 FINE, REACH = 16, 128  # steps per resolution cell in which peaks are searched, and how many on each side
 
 
 @dataclass(frozen=True, eq=False)
 class Displacements:
-    """What a phase moves.
+    """Displacements of places by a phase.
 
     places  m (k, 3), brightest first
     along   m (k,), displacements of the places across range, positive towards where the antennas move

@@ -8,17 +8,18 @@ no target. What makes one target sharper at the cost of others, such as an echo 
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from ..base.validation import sealed
 from . import _bright_points, _displacement, _phase_gradient, _phase_smoothing, _smooth_search
-from ._aperture_view import NO_LAG, WINDOW, ApertureView, Errors
+from ._aperture_view import NO_LAG, ApertureView, Errors
 from ._constant_echo import without_constant_echo
-from ._search import GROWTH
+from ._echo_parts import near_and_far, phase_of
 
 log = logging.getLogger(__name__)
 
@@ -27,12 +28,11 @@ AGREE = 0.4  # least closeness of two phases at which they agree; that of noise 
 # rather than risked: neighbouring points of the scene, which both halves of the band show, can gain as much by chance
 GAIN = 1.05
 KEPT = 0.95  # least change in sharpness, which is that of noise too, of the echoes without those of constant delay
-LOST = 0.5  # of its power, less than which a point must not keep: pixels beside its maximum show about as much
+LOST = 0.5  # share of its power that a point must keep: pixels beside its maximum show about as much
 APART = 0.5  # resolution cells: what moves bright places against one another by more must be known for certain
 SURE = 0.98  # agreement of the halves of the band from which on it is; 0.95 to 0.98 has been wrong by 1.4 cells
 COMMON = 0.35  # share of their pulses that neighbouring bright places must have in common for it
-SPANS = 16  # of the aperture: a slope of the phase over one of them moves points, one over a few pulses blurs them
-PASSES = 3  # of the estimate from given places
+SPANS = 16  # spans of the aperture: a slope of the phase over one moves points, one over a few pulses blurs them
 IN_FOCUS = (
     "no phase sharpens echoes that it was not found from: the data are as well focused as these echoes can show; if "
     "the image is blurred, give a grid over its brightest isolated points"
@@ -58,9 +58,69 @@ MOVED_APART = (
 UNSURE = "the halves of the band agree to {:.2f} only, where {} is wanted"
 UNLINKED = "of the pulses that see one of them too few see the next: {:.0%}, where {:.0%} is wanted"
 CLOSER = 1.05  # preference for the phase from all echoes, which is the most exact, unless its smoothing went wrong
-# of the power of the brightest place: side lobes in range, of a Hamming window over the band, are below (-43 dB)
-SIDE_LOBES = 1e-4
-BETWEEN = 2.0  # range cells of half the band behind the border of near and far places, which neither uses
+
+
+@dataclass(frozen=True, eq=False)
+class _Echoes:
+    """Contributions of places (n, k): with the given range errors removed, and without any correction."""
+
+    view: ApertureView
+    corrected: np.ndarray
+    plain: np.ndarray
+
+    @classmethod
+    def joined(cls, parts: Sequence[_Echoes]) -> _Echoes:
+        """The places of all parts."""
+        corrected, plain = (
+            np.concatenate(arrays, axis=1) for arrays in zip(*((p.corrected, p.plain) for p in parts), strict=True)
+        )
+        return cls(parts[0].view, corrected, plain)
+
+    def picked(self, places: np.ndarray) -> _Echoes:
+        """The places of a mask (k,)."""
+        return _Echoes(self.view, self.corrected.compress(places, axis=1), self.plain.compress(places, axis=1))
+
+    def sharpness(self, phase: np.ndarray) -> float:
+        """Sharpness with a phase (n,) and the range errors removed."""
+        return _phase_gradient.sharpness(self.corrected, phase, self.view.window)
+
+    @cached_property
+    def plain_sharpness(self) -> float:
+        """Sharpness without any correction."""
+        return max(_phase_gradient.sharpness(self.plain, np.zeros(self.view.n), self.view.window), 1e-300)
+
+    def gain(self, phase: np.ndarray) -> float:
+        """Gain in sharpness by a phase (n,)."""
+        return self.sharpness(phase) / self.plain_sharpness
+
+
+@dataclass(frozen=True, eq=False)
+class _Test:
+    """A phase (n,) of some echoes, the others that it must sharpen, and the phase of these themselves."""
+
+    phase: np.ndarray
+    others: _Echoes
+    own: np.ndarray
+
+    def gains(self, ladder: list[int]) -> list[float]:
+        """Gains of the others by the phase, smoothed to each number of cosines, and registered to their image."""
+        unwrappings = _phase_smoothing.unwrappings(self.phase)
+        curves = (_phase_smoothing.smooth(self.phase, modes, unwrappings) for modes in ladder)
+        return [self.others.gain(_registered(self.others.view, curve, self.own)[0]) for curve in curves]
+
+
+@dataclass(frozen=True, eq=False)
+class _Curves:
+    """Phases (n,) of both halves of the band, of so many cosines, and the gain in sharpness of each other half.
+
+    agreement  closeness of the phases;  do_agree  whether it is more than chance
+    """
+
+    modes: int
+    phases: list[np.ndarray]
+    gains: np.ndarray
+    agreement: float = 0.0
+    do_agree: bool = False
 
 
 def cross_validated(view: ApertureView, errors: Errors, tick: Callable[[], None]) -> tuple[Errors, dict[str, Any]]:
@@ -69,150 +129,163 @@ def cross_validated(view: ApertureView, errors: Errors, tick: Callable[[], None]
     Every half of the echoes gives a phase of its own, with the given range errors. It is smoothed to the number of
     cosines that sharpens the other halves most.
     """
-    n, shift, samples = view.n, errors[1], view.raw.n_samples
-    zero = np.zeros(n)
+    zero = np.zeros(view.n)
     places = view.probes((zero, zero), errors)
-    parts = view.band(0, samples // 2), view.band(samples - samples // 2, samples)
-    values = [part.contributions((zero, shift), places, NO_LAG, taper=True)[:, :, 0] for part in parts]
-    plain = values
-    if shift.any():
-        plain = [part.contributions((zero, zero), places, NO_LAG, taper=True)[:, :, 0] for part in parts]
+    halves = _halves_of_band(view, errors[1], places)
     tick()
-    sets = [np.tile(s, view.channels) for s in _near_and_far(parts[0], places, values, errors[0])]
-
-    def closeness(a: np.ndarray, b: np.ndarray) -> float:
-        return _phase_smoothing.alignment(a, b, view.shift_phase, view.cell / 2)[1]
-
-    least = max(AGREE, _phase_smoothing.chance(n))
-    bands = [_phase(view, v) for v in values]
-    moved, agreement = _phase_smoothing.alignment(bands[0], bands[1], view.shift_phase, view.cell / 2)
-    difference = np.exp(1j * (moved - bands[1]))
-    # (phase, columns it must sharpen, the same without any correction, phase of these columns)
-    tests = [(bands[1 - h], values[h], plain[h], bands[h]) for h in (0, 1)]
-    sides = []
-    for some in sets:
-        own = [_phase(view, v.compress(some, axis=1)) for v in values] if some.sum() > 1 else []
-        known = closeness(*own) if own else 0.0
-        both = np.concatenate([v.compress(some, axis=1) for v in values], axis=1)
-        old = np.concatenate([v.compress(some, axis=1) for v in plain], axis=1)
-        sides.append((known, _phase(view, both) if known > least else zero, both, old))
-        log.debug("%d places give phases that agree to %.2f between halves of the band", some.sum(), known)
-    if all(side[0] > least for side in sides):
-        tests += [(sides[1 - i][1], sides[i][2], sides[i][3], sides[i][1]) for i in (0, 1)]
+    bands = [phase_of(view, half.corrected) for half in halves]
+    tests = [_Test(bands[1 - h], halves[h], bands[h]) for h in (0, 1)]
+    tests += _tests_of_places(view, places, halves, errors[0])
     tick()
-
-    ladder = [2**k for k in range(2, 40) if 2**k < n] + [n]
-
-    def ladder_of_gains(phase: np.ndarray, held: np.ndarray, before: np.ndarray, own: np.ndarray) -> list[float]:
-        """Gains in sharpness by the phase of other echoes, smoothed, and registered to the image of these."""
-        was = max(_phase_gradient.sharpness(before, zero, view.window), 1e-300)
-        ways = _phase_smoothing.unwrappings(phase)
-        smoothed = (_phase_smoothing.smooth(phase, modes, ways) for modes in ladder)
-        moved = (_phase_smoothing.alignment(curve, own, view.shift_phase, view.cell / 2)[0] for curve in smoothed)
-        return [_phase_gradient.sharpness(held, curve, view.window) / was for curve in moved]
-
-    gains = np.array([ladder_of_gains(*test) for test in tests]).T
-    best = int(gains[:, :2].prod(axis=1).argmax())
-    modes, gain = ladder[best], gains[best, :2]
-    agree = agreement > least
-    curves = [_phase_smoothing.smooth(phase, modes) for phase in bands]
-    if modes < n:
-        agreement = closeness(*curves)
-        agree |= agreement > _least_of_curves(curves, modes, closeness)
-    if view.is_narrow:  # where each place has its own pulses, few cosines leave the places apart
-        other = _searched_as_curves(view, values, plain, bands)
-        close = closeness(*other[1])
-        sharper = other[2].prod() > gain.prod()  # phases of single pulses may focus several points to one
-        if close > _least_of_curves(other[1], other[0], closeness) and (sharper or not agree):
-            agree, agreement = True, close
-            modes, curves, gain = other
-    # phases from some of the places have more noise, and ask for more smoothing
-    apart = gains[:, 2:].min(axis=1).max() if len(tests) > 2 else np.inf
+    ladder = [2**k for k in range(2, 40) if 2**k < view.n] + [view.n]
+    gains = np.array([test.gains(ladder) for test in tests]).T
     log.debug("gains of %s cosines: %s", ladder, gains.round(3).tolist())
-
-    # the result must sharpen the whole band too: a phase with an error of unwrapping would not
-    candidates = [_phase_smoothing.smooth(errors[0], modes), *curves]
-    smoothed = [view.shift_removed((curve, shift)) for curve in candidates]
-    both, old = np.concatenate(values, axis=1), np.concatenate(plain, axis=1)
-    levels = np.array([_phase_gradient.sharpness(both, e[0], view.window) for e in smoothed])
-    chosen = int((levels * (CLOSER, 1, 1)).argmax())
-    was = _phase_gradient.sharpness(old, zero, view.window)
-    lowest = min(*gain, apart, levels[chosen] / max(was, 1e-300))
-    final = smoothed[chosen]
+    # phases from some of the places have more noise, and ask for more smoothing
+    gain_of_places = gains[:, 2:].min(axis=1).max() if len(tests) > 2 else np.inf
+    curves = _agreeing_curves(view, halves, bands, ladder, gains[:, :2])
+    final, gain = _sharpest(view, errors, curves, halves)
     power = view.power(final)
     displaced = _displacement.displacements(view, final, power)
-    reason = ""
-    if not agree:
-        reason = DISAGREE.format(agreement)
+    lowest = min(*curves.gains, gain_of_places, gain)
+    if not curves.do_agree:
+        reason = DISAGREE.format(curves.agreement)
     elif lowest > GAIN and not _sharpens_others(view, final):
         reason = BLURRED
     elif lowest > GAIN and not _none_lost(view, final, power):
         reason = LOST_POINT
-    elif gain.min() > GAIN >= apart:
-        reason = BLURRED
     elif lowest <= GAIN:
-        reason = IN_FOCUS
+        reason = BLURRED if curves.gains.min() > GAIN >= gain_of_places else IN_FOCUS
     else:
-        reason = _apart(displaced, agreement)
+        reason = _apart(displaced, curves.agreement)
+    difference = np.exp(1j * (_registered(view, *bands)[0] - bands[1]))
     return final, {
         "found": not reason,
-        "gain": float(np.sqrt(gain.prod())),
-        "agreement": agreement,
+        "gain": float(np.sqrt(curves.gains.prod())),
+        "agreement": curves.agreement,
         "spread": float(np.std(np.angle(difference * difference.sum().conj())) / 2),
-        "modes": modes,
+        "modes": curves.modes,
         "reason": reason,
         "places": sealed(displaced.places),
         "displacements": sealed(displaced.along),
     }
 
 
-def _searched_as_curves(
-    view: ApertureView, values: list[np.ndarray], plain: list[np.ndarray], free: list[np.ndarray]
-) -> tuple[int, list[np.ndarray], np.ndarray]:
-    """Phases of few cosines of both halves of the band, searched as such: their number, the phases, and their gains.
+def _registered(view: ApertureView, phase: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, float]:
+    """A phase (n,) shifted to where the image with the other phase is, and the closeness of the two."""
+    return _phase_smoothing.alignment(phase, other, view.shift_phase, view.cell / 2)
 
-    values, plain  contributions from the halves, with the range errors removed and without any correction
-    free           phases of single pulses that sharpen the halves
+
+def _halves_of_band(view: ApertureView, shift: np.ndarray, places: np.ndarray) -> list[_Echoes]:
+    """Contributions of places, m (k, 3), in both halves of the band; shift: range errors, m (n,)."""
+    zero, n_samples = np.zeros(view.n), view.raw.n_samples
+    halves = []
+    for band in view.band(0, n_samples // 2), view.band(n_samples - n_samples // 2, n_samples):
+        corrected = band.contributions((zero, shift), places, NO_LAG, taper=True)[:, :, 0]
+        plain = corrected
+        if shift.any():
+            plain = band.contributions((zero, zero), places, NO_LAG, taper=True)[:, :, 0]
+        halves.append(_Echoes(view, corrected, plain))
+    return halves
+
+
+def _tests_of_places(view: ApertureView, places: np.ndarray, halves: list[_Echoes], phase: np.ndarray) -> list[_Test]:
+    """Near against far places and far against near ones; none where the halves of the band disagree about either."""
+    values = [half.corrected for half in halves]
+    lower_half = view.band(0, view.raw.n_samples // 2)
+    sides: list[tuple[_Echoes, np.ndarray]] = []
+    for picked_places in near_and_far(lower_half, places, values, phase):
+        mask, close = np.tile(picked_places, view.channels), 0.0
+        parts = [half.picked(mask) for half in halves]
+        if mask.sum() > 1:
+            close = _registered(view, *(phase_of(view, part.corrected) for part in parts))[1]
+        log.debug("%d places give phases that agree to %.2f between halves of the band", mask.sum(), close)
+        if close > max(AGREE, _phase_smoothing.chance(view.n)):
+            side = _Echoes.joined(parts)
+            sides.append((side, phase_of(view, side.corrected)))
+    if len(sides) < 2:
+        return []
+    (near, phase_of_near), (far, phase_of_far) = sides
+    return [_Test(phase_of_far, near, phase_of_near), _Test(phase_of_near, far, phase_of_far)]
+
+
+def _agreeing_curves(
+    view: ApertureView, halves: list[_Echoes], bands: list[np.ndarray], ladder: list[int], gains: np.ndarray
+) -> _Curves:
+    """Phases of the halves of the band as the curves that sharpen best.
+
+    bands  phases (n,) of single pulses;  gains  by them, smoothed to each number of cosines of the ladder (., 2)
     """
-    zero = np.zeros(view.n)
-    was = [max(_phase_gradient.sharpness(before, zero, view.window), 1e-300) for before in plain]
-    searched = [_smooth_search.curves(v, phase, view.window) for v, phase in zip(values, free, strict=True)]
+
+    def closeness(a: np.ndarray, b: np.ndarray) -> float:
+        return _registered(view, a, b)[1]
+
+    best = int(gains.prod(axis=1).argmax())
+    modes = ladder[best]
+    curves = _Curves(modes, [_phase_smoothing.smooth(phase, modes) for phase in bands], gains[best])
+    agreement = closeness(*bands)
+    do_agree = agreement > max(AGREE, _phase_smoothing.chance(view.n))
+    if modes < view.n:
+        agreement = closeness(*curves.phases)
+        do_agree |= agreement > _least_of_curves(curves, closeness)
+    if view.is_narrow:  # where each place has its own pulses, few cosines leave the places apart
+        searched = _searched_as_curves(view, halves, bands)
+        close = closeness(*searched.phases)
+        is_sharper = searched.gains.prod() > curves.gains.prod()  # phases of single pulses may focus points to one
+        if close > _least_of_curves(searched, closeness) and (is_sharper or not do_agree):
+            return replace(searched, agreement=close, do_agree=True)
+    return replace(curves, agreement=agreement, do_agree=do_agree)
+
+
+def _sharpest(view: ApertureView, errors: Errors, curves: _Curves, halves: list[_Echoes]) -> tuple[Errors, float]:
+    """The errors with the phase of all echoes, or of one half of the band, that sharpens the whole band most.
+
+    A phase with an error of unwrapping would not sharpen it. Also returns its gain in sharpness.
+    """
+    band = _Echoes.joined(halves)
+    candidates = [_phase_smoothing.smooth(errors[0], curves.modes), *curves.phases]
+    smoothed = [view.shift_removed((curve, errors[1])) for curve in candidates]
+    levels = np.array([band.sharpness(phase) for phase, _ in smoothed])
+    best = int((levels * (CLOSER, 1, 1)).argmax())
+    return smoothed[best], levels[best] / band.plain_sharpness
+
+
+def _searched_as_curves(view: ApertureView, halves: list[_Echoes], free: list[np.ndarray]) -> _Curves:
+    """Phases of few cosines of both halves of the band, searched as such; free: those of single pulses."""
+    searched = [
+        _smooth_search.curves(half.corrected, phase, view.window) for half, phase in zip(halves, free, strict=True)
+    ]
     pairs = list(zip(*searched, strict=True))
 
     def gains(pair: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-        moved = [_phase_smoothing.alignment(a, b, view.shift_phase, view.cell / 2)[0] for a, b in (pair, pair[::-1])]
-        sharp = [_phase_gradient.sharpness(values[1 - h], moved[h], view.window) / was[1 - h] for h in (0, 1)]
-        return np.array(sharp)
+        return np.array([halves[1 - h].gain(_registered(view, pair[h], pair[1 - h])[0]) for h in (0, 1)])
 
     levels = [gains(pair) for pair in pairs]
     best = int(np.argmax([level.prod() for level in levels]))
-    return _smooth_search.MODES[best], list(pairs[best]), levels[best]
+    return _Curves(_smooth_search.MODES[best], list(pairs[best]), levels[best])
 
 
-def _least_of_curves(
-    curves: list[np.ndarray], modes: int, closeness: Callable[[np.ndarray, np.ndarray], float]
-) -> float:
-    """Closeness from which on the phases of both halves of the band, smoothed to `modes` cosines, agree.
+def _least_of_curves(curves: _Curves, closeness: Callable[[np.ndarray, np.ndarray], float]) -> float:
+    """Closeness from which on the phases of both halves of the band, smoothed to so many cosines, agree.
 
     With few points in a range cell the phases of single pulses, each free, focus them to fewer points than there are:
     two such phases have no more than the smooth curve in common on which they lie. Curves of few cosines are close by
     chance far more often, and curves near zero are close whatever they are: those must be closer to each other than to
     zero.
     """
-    zero = np.zeros(len(curves[0]))
-    return max(AGREE, _phase_smoothing.chance(modes), *(closeness(curve, zero) for curve in curves))
+    zero = np.zeros(len(curves.phases[0]))
+    return max(AGREE, _phase_smoothing.chance(curves.modes), *(closeness(curve, zero) for curve in curves.phases))
 
 
 def _apart(moved: _displacement.Displacements, agreement: float) -> str:
-    """Why a correction that moves bright places against one another is refused; empty where it is not.
+    """Reason to refuse a correction that moves bright places against one another; empty where there is none.
 
     Each place alone is as sharp wherever it lies. That two of them belong where the phase puts them is known as far as
     the same pulses see both, and as far as the halves of the band say the same.
     """
     if moved.apart <= APART or (agreement >= SURE and moved.common >= COMMON):
         return ""
-    why = UNSURE.format(agreement, SURE) if agreement < SURE else UNLINKED.format(moved.common, COMMON)
-    return MOVED_APART.format(np.ptp(moved.along), moved.apart, why)
+    doubt = UNSURE.format(agreement, SURE) if agreement < SURE else UNLINKED.format(moved.common, COMMON)
+    return MOVED_APART.format(np.ptp(moved.along), moved.apart, doubt)
 
 
 def _sharpens_others(view: ApertureView, errors: Errors) -> bool:
@@ -247,63 +320,3 @@ def _none_lost(view: ApertureView, errors: Errors, power: np.ndarray) -> bool:
             log.debug("the point at %s, bright before, is lost", place)
             return False
     return True
-
-
-def _near_and_far(
-    view: ApertureView, places: np.ndarray, values: list[np.ndarray], phase: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Two sets of places, bool (k,) each, at different ranges, of sharpness as equal as can be.
-
-    Places between the sets belong to neither. Where they are all the targets that one of them has, the sets are those
-    of which the fainter is as sharp as can be; where these lack a target too, both are empty.
-    """
-    middle = view.n // 2 * view.channels
-    cells = _bright_points.delay(view.raw, middle, places) * view.raw.bandwidth[0]
-    level = np.maximum(*(sum(abs(_phase_gradient.turned(v, e).sum(axis=0)) ** 4 for v in values)
-                         for e in (phase, 0 * phase)))  # fmt: skip
-    level = level.reshape(view.channels, -1).sum(axis=0)
-    order = np.argsort(cells)
-    ranges, total = cells[order], np.concatenate([[0.0], np.cumsum(level[order], dtype=np.float64)])
-    beyond = np.searchsorted(ranges, ranges + BETWEEN, side="right")
-    bright = level >= SIDE_LOBES**2 * level.max()
-    for first in (np.arange(1, len(order) + 1), beyond):  # of the places behind each border, in order of range
-        border = ranges[int(np.minimum(total[1:], total[-1] - total[first]).argmax())]
-        sets = cells <= border, cells > border + BETWEEN
-        if all((some & bright).any() for some in sets):
-            return sets
-    return np.zeros(len(cells), bool), np.zeros(len(cells), bool)
-
-
-def _phase(view: ApertureView, v: np.ndarray) -> np.ndarray:
-    """The phase (n,), from a start without any, that sharpens the contributions v (n, k) to bright points most."""
-    if view.is_narrow:
-        return _narrow_phase(v)
-    first, last = view.narrow_pulses
-    phase = np.zeros(view.n)
-    brightest = np.argsort(-np.abs(v[first:last].sum(axis=0)))[: view.places]
-    phase[first:last] = _narrow_phase(v[first:last].take(brightest, axis=1))
-    while last - first < view.n:
-        step = (last - first) // GROWTH + 1
-        low, high = max(0, first - step), min(view.n, last + step)
-        start = _phase_gradient.extended(v[low:high], phase[low:high], first - low, last - low)
-        phase[low:high] = _phase_gradient.sharpen(v[low:high], start, 0)
-        first, last = low, high
-    still = _phase_gradient.sharpen(v, np.zeros(view.n), 0)
-    return max((phase, still), key=lambda start: _phase_gradient.sharpness(v, start, 0))
-
-
-def _narrow_phase(v: np.ndarray) -> np.ndarray:
-    """`_phase` over a narrow aperture."""
-    n = len(v)
-    phase = np.zeros(n)
-    for k in range(PASSES):
-        widths = [max(n / 2 ** (k + i / 2), _phase_gradient.NARROWEST) for i in range(8)]
-        width = max(n / 4**k, WINDOW)
-        left = _phase_gradient.turned(v, phase)
-        starts = [np.zeros(n), _phase_gradient.gradient(left, widths)]
-        levels = [_phase_gradient.sharpness(left, start, width) for start in starts]
-        step = _phase_gradient.sharpen(left, starts[int(np.argmax(levels))], width)
-        phase = phase + step
-        if width <= WINDOW and _phase_gradient.sharpness(left, step, width) < 1.002 * levels[0]:
-            break
-    return phase

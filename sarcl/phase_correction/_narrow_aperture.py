@@ -18,8 +18,8 @@ CELLS = 8  # Doppler cells: distance across range of the points that are looked 
 # of contributions holds; and of one CELLS beside it, which is one of many
 MOST_BEHIND, MOST_BESIDE = 1.5, 4.0
 LEAST_PULSES = 8
-PLACES = 16  # of the grid that are looked at
-PULSES = 64  # of the aperture that are looked at
+PLACES = 16  # places of the grid that are examined
+PULSES = 64  # pulses of the aperture that are examined
 
 
 def narrow_pulses(raw: PhaseHistory, grid: ImageGrid, frequency: float, depth: float) -> tuple[int, int]:

@@ -47,10 +47,10 @@ def gradient(v: np.ndarray, widths: list[float]) -> np.ndarray:
         point = np.sqrt(np.clip(2 - fourth / second**2, 1e-4, 0.9999))
         cut *= np.sqrt(np.minimum(point / (1 - point), 1e3) / second).astype(np.float32)
         step = np.angle((cut[1:] * cut[:-1].conj()).sum(axis=1))
-        found = np.concatenate([[0.0], np.cumsum(step)])
+        estimate = np.concatenate([[0.0], np.cumsum(step)])
         for _ in range(POWER_STEPS):
-            found = np.angle((cut * turned(cut, found).sum(axis=0).conj()).sum(axis=1))
-        phase += detrended(np.unwrap(found))
+            estimate = np.angle((cut * turned(cut, estimate).sum(axis=0).conj()).sum(axis=1))
+        phase += detrended(np.unwrap(estimate))
     return phase
 
 
@@ -77,9 +77,9 @@ def sharpen(v: np.ndarray, phase: np.ndarray, width: float, steps: int = 30, eno
 def extended(v: np.ndarray, phase: np.ndarray, first: int, last: int) -> np.ndarray:
     """Phase (n,) of all pulses that fits the image of pulses first ... last - 1 at the points, which keep their own."""
     image = _at_points(v[first:last], phase[first:last])
-    found = np.angle(_like(v, _cubed(image)))
-    found[first:last] = phase[first:last]
-    return np.asarray(found)
+    extension = np.angle(_like(v, _cubed(image)))
+    extension[first:last] = phase[first:last]
+    return np.asarray(extension)
 
 
 def sharpness(v: np.ndarray, phase: np.ndarray, width: float) -> float:
@@ -122,11 +122,11 @@ def _at_points(v: np.ndarray, phase: np.ndarray) -> np.ndarray:
     turn = np.exp(-1j * phase).astype(np.complex64)[:, None]
 
     def image(pulses: slice) -> np.ndarray:
-        made = np.zeros(v.shape[1], np.complex64)
+        total = np.zeros(v.shape[1], np.complex64)
         for first in range(pulses.start, pulses.stop, FEW):
             rows = slice(first, min(first + FEW, pulses.stop))
-            made += (v[rows] * turn[rows]).sum(axis=0)
-        return made
+            total += (v[rows] * turn[rows]).sum(axis=0)
+        return total
 
     return np.asarray(sum(of_each(image, _parts(v))))
 

@@ -130,8 +130,8 @@ def alignment(phase: np.ndarray, other: np.ndarray, along: np.ndarray, reach: fl
     for start in (np.array([slopes[close.argmax()], 0.0]), fit @ np.unwrap(np.angle(difference))):
         shift = np.clip(start, -limit, limit)
         for _ in range(5):
-            left = difference * np.exp(-1j * moves @ shift)
-            shift = np.clip(shift + fit @ np.angle(left * left.sum().conj()), -limit, limit)
+            residual = difference * np.exp(-1j * moves @ shift)
+            shift = np.clip(shift + fit @ np.angle(residual * residual.sum().conj()), -limit, limit)
         level = float(np.abs((difference * np.exp(-1j * moves @ shift)).mean()))
         if level > closest:
             best, closest = phase + moves @ shift, level

@@ -18,7 +18,7 @@ MOVED = 0.05  # range cells: no range error changes by more
 GROWTH = 4  # a sub-aperture grows by a fourth of its length on each side
 LAST_PASSES = 3  # passes over the whole aperture, at most
 BANDS = 8, 4, 2, 1  # parts of the band: a range error of eight cells is one cell of an eighth of the band
-LEAST_SAMPLES = 8  # in a part of the band
+LEAST_SAMPLES = 8  # samples in a part of the band
 RANGE_MODES = 8  # cosines over the aperture for range errors, or an eighth of the pulses where that is fewer
 # Doppler cells between places where range errors are estimated. A target beside a place, in the window about it, moves
 # through range cells; where only places on one side see it, as at the edge of a grid, that looks like a range error
@@ -81,9 +81,9 @@ def _widened(view: ApertureView, errors: Errors) -> Errors:
         now = phase[low:high], shift[low:high]
         v = view.pulses(low, high).contributions(now, places, NO_LAG)[:, :, 0]
         start = _phase_gradient.extended(v, np.zeros(high - low), first - low, last - low)
-        found = _phase_gradient.sharpen(v, start, 0)
-        phase[low:high] += found
-        if passes and _phase_gradient.sharpness(v, found, 0) < ENOUGH * _phase_gradient.sharpness(v, start, 0):
+        step_of_phase = _phase_gradient.sharpen(v, start, 0)
+        phase[low:high] += step_of_phase
+        if passes and _phase_gradient.sharpness(v, step_of_phase, 0) < ENOUGH * _phase_gradient.sharpness(v, start, 0):
             break
         first, last = low, high
     # a start without phases: where targets seen by different pulses have none in common, growth loses some of them
@@ -111,30 +111,30 @@ def search(view: ApertureView, ranges: bool, tick: Callable[[], None]) -> Errors
     tick()
     if not ranges:
         return plain
-    found = plain
+    estimate = plain
     if view.is_narrow:
         if _migrates(view, plain):
-            found, m = (zero, zero), view.raw.n_samples
+            estimate, m = (zero, zero), view.raw.n_samples
             for parts in BANDS:
                 if m // parts >= LEAST_SAMPLES:
                     first = (m - m // parts) // 2
-                    found = _narrow(view.band(first, first + m // parts), found, True, 3)
+                    estimate = _narrow(view.band(first, first + m // parts), estimate, True, 3)
                 tick()
         else:
             for _ in BANDS:
                 tick()
-    motions = [(plain[0], view.implied_range(plain[0])), found, (found[0], view.implied_range(found[0]))]
-    motions = [e for e in motions[: 1 if found is plain else 3] if np.std(e[1]) > RANGE_CELLS * view.cell]
+    motions = [(plain[0], view.implied_range(plain[0])), estimate, (estimate[0], view.implied_range(estimate[0]))]
+    motions = [e for e in motions[: 1 if estimate is plain else 3] if np.std(e[1]) > RANGE_CELLS * view.cell]
     if not motions:
         return plain
-    places = view.probes(*([plain] if found is plain else [plain, found]), apart=APART)
+    places = view.probes(*([plain] if estimate is plain else [plain, estimate]), apart=APART)
 
     def sharpened(errors: Errors) -> tuple[float, Errors]:
         v = view.values(errors, places)
         step = _phase_gradient.sharpen(v, zero, view.window)
         return _phase_gradient.sharpness(v, step, view.window), view.shift_removed((errors[0] + step, errors[1]))
 
-    stays = [plain] if found is plain else [plain, (found[0], zero)]
+    stays = [plain] if estimate is plain else [plain, (estimate[0], zero)]
     still = max((sharpened(e) for e in stays), key=lambda s: s[0])
     best = max((sharpened(e) for e in motions), key=lambda s: s[0])
     log.debug("with a range error the sharpness is x %.4f", best[0] / max(still[0], 1e-300))

@@ -7,7 +7,7 @@ import numpy as np
 from . import _phase_gradient, _phase_smoothing
 
 MODES = 4, 8, 16, 32  # cosines over the aperture
-STEPS = 15  # of the ascent, for each number of cosines
+STEPS = 15  # steps of the ascent, for each number of cosines
 
 
 def curves(v: np.ndarray, free: np.ndarray, width: float) -> list[np.ndarray]:
@@ -18,12 +18,12 @@ def curves(v: np.ndarray, free: np.ndarray, width: float) -> list[np.ndarray]:
     width  Doppler bins about 0, as of `_phase_gradient.sharpen`, whose steps are projected onto the cosines. MODES of
            half the pulses or more are left out.
     """
-    phase, found = np.zeros(len(v)), []
+    phase, phases = np.zeros(len(v)), []
     for modes in (m for m in MODES if 2 * m < len(v)):
         ends = [_ascended(v, start, modes, width) for start in (phase, _phase_smoothing.smooth(free, modes))]
         phase = max(ends, key=lambda end: _phase_gradient.sharpness(v, end, width))
-        found.append(phase)
-    return found
+        phases.append(phase)
+    return phases
 
 
 def _ascended(v: np.ndarray, phase: np.ndarray, modes: int, width: float) -> np.ndarray:

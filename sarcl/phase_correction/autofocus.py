@@ -140,17 +140,12 @@ def autofocus(
     weighted = raw if window is None and weights is None else replace(raw, weight=row_weight)
     if window is not None:
         weighted = replace(weighted, samples=Tapered(raw.samples, sample_weight))
-    energy = _bright_points.energy(weighted)
-    alive = energy[rows].any(axis=1)
-    if alive.sum() < LEAST_PULSES:
-        raise ValueError(
-            f"raw has {alive.sum()} pulses with any energy, of {len(rows)}; autofocus needs {LEAST_PULSES} or more"
-        )
-    view = _aperture_view(weighted, rows, grid)
-    options = {"max_bytes": max_bytes, "device": device}
-    scale = float(np.sqrt(energy.max()))
-    cone = None if toward is None else (angle, toward[rows.ravel()])
-    view = replace(view, alive=alive, places=places, scale=scale, beam=cone, options=options)
+    view = replace(
+        _aperture_view(weighted, rows, grid),
+        places=places,
+        beam=None if toward is None else (angle, toward[rows.ravel()]),
+        options={"max_bytes": max_bytes, "device": device},
+    )
     tick = _ticker(progress, _search.searches(view, bool(range_errors)) + 2)
     errors = _search.search(view, bool(range_errors), tick)
     unseen = unseen_pixels(make_task(weighted, grid, None, None, False, True, beam, True))
@@ -170,7 +165,16 @@ def autofocus(
 
 
 def _aperture_view(raw: PhaseHistory, rows: np.ndarray, grid: ImageGrid) -> ApertureView:
-    """Pulses in order of time, from rows (n_pulses, n_channels), and geometry; ValueError without an aperture."""
+    """Pulses in order of time, from rows (n_pulses, n_channels), and geometry.
+
+    ValueError without an aperture, or without enough pulses that have energy.
+    """
+    energy = _bright_points.energy(raw)
+    alive = energy[rows].any(axis=1)
+    if alive.sum() < LEAST_PULSES:
+        raise ValueError(
+            f"raw has {alive.sum()} pulses with any energy, of {len(rows)}; autofocus needs {LEAST_PULSES} or more"
+        )
     order = rows.ravel()
     ordered = raw if np.array_equal(order, np.arange(raw.n_rows)) else raw[order]
     frequency = float(np.median(raw.center_frequency))
@@ -188,7 +192,8 @@ def _aperture_view(raw: PhaseHistory, rows: np.ndarray, grid: ImageGrid) -> Aper
         )
     axes = np.linalg.svd(look, full_matrices=False)[2][:2]
     shift_phase = 2 * np.pi * frequency / SPEED_OF_LIGHT * look @ axes.T
-    return ApertureView(ordered, rows.shape[1], grid, frequency, shift_phase, np.ones(len(rows), bool))
+    scale = float(np.sqrt(energy.max()))
+    return ApertureView(ordered, rows.shape[1], grid, frequency, shift_phase, alive, scale=scale)
 
 
 def _ticker(progress: Progress | None, total: int) -> Callable[[], None]:

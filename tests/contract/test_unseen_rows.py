@@ -9,7 +9,7 @@ import pytest
 from helpers.cases import image_error, noise_on, straight, thinned
 
 import sarcl
-from sarcl.imaging.direct import line_plan
+from sarcl.imaging.direct import _line_curvature, line_plan
 
 
 def holds(raw, grid, tolerance, **options):
@@ -55,7 +55,7 @@ def test_pulses_that_see_the_grid_more_grazing_than_the_sampled_ones(tolerance):
     n = 1600
     sampled = np.zeros(n, bool)
     for group in line_plan.GROUP_SIZES:
-        for start in line_plan.sampled_groups(n, group):
+        for start in _line_curvature.sampled_groups(n, group):
             sampled[start : start + group + 1] = True
     assert sampled.sum() < n / 2
     angle = np.where(sampled, 0.3, 1.4)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import sarcl
+from sarcl.imaging import choose_method
 from sarcl.imaging.focusing_task import make_task
 from sarcl.model.antenna_pattern import two_way_gain
 from sarcl.reference.backproject import backproject as exact
@@ -158,3 +159,13 @@ def test_an_antenna_that_looks_everywhere_changes_nothing():
 def test_what_cannot_be_says_why(options, message):
     with pytest.raises(ValueError, match=message):
         sarcl.plan(noise(), GRID, **{"tolerance": 1e-3, **options})
+
+
+def test_rows_weighted_pixel_by_pixel_are_never_merged():
+    """Sub-apertures share the weights of their rows: of a large image with an antenna they lost its gains."""
+    task = make_task(
+        noise(), sarcl.ImageGrid.plane(center=MIDDLE, shape=(512, 512), spacing=0.1), None, None, False, True
+    )
+    assert choose_method.choose(task, "auto", 1e-2).method == "factorized"
+    weighted = replace(task, antenna=make_task(noise(), GRID, None, None, False, True, ANTENNAS["gaussian"]).antenna)
+    assert choose_method.choose(weighted, "auto", 1e-2).method == "direct"

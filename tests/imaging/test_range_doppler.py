@@ -14,7 +14,7 @@ from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.imaging.range_doppler import _focus
 from sarcl.imaging.range_doppler._bins import Bins
 from sarcl.imaging.range_doppler._doppler import Band
-from sarcl.imaging.range_doppler._plan import _blocks, _lacking, curved
+from sarcl.imaging.range_doppler._plan import _Compression, curved
 from sarcl.imaging.range_doppler._velocity import Hyperbolas
 from sarcl.numerics.interpolation import interpolator
 from sarcl.numerics.range_profiles import correction, from_samples
@@ -606,9 +606,10 @@ def test_range_blocks_have_the_error_of_a_cubic(psi):
     fit = Hyperbolas(4e3, 5e3, np.array([[100.0, 0.0, 0.0]]))
     band = Band(-0.3, 0.1, 0.02, 0.0)
     frequencies = np.linspace(9.3e9, 9.9e9, 64)
-    whole = _lacking(frequencies, 9.6e9, fit, band, ranges[[0, -1]])
+    compression = _Compression(frequencies, 9.6e9, fit, band, ranges)
+    whole = compression._difference(0, -1)
     allowed = 0.3 * worst * 1.001
-    blocks, error = _blocks(frequencies, 9.6e9, fit, band, ranges, allowed, 1e-3)
+    blocks, error = compression.blocks(allowed, 1e-3)
     assert 0.11 * worst < error <= allowed
     # as many blocks as that phase needs, in steps of a third of an octave
     assert whole / psi <= 1.01 * len(blocks) <= 1.45 * whole / psi

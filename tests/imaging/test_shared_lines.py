@@ -11,7 +11,7 @@ from helpers.devices import opened, variants
 
 import sarcl
 from sarcl.base.stage_timer import Clock
-from sarcl.imaging.direct import _shared_line_plan, direct, line_plan, tile_kernels
+from sarcl.imaging.direct import _line_curvature, _shared_line_plan, direct, tile_kernels
 from sarcl.imaging.direct._shared_line_plan import SharedLinePlan
 from sarcl.imaging.focusing_task import make_task
 from sarcl.numerics import cost_model, error_bounds, interpolation
@@ -33,10 +33,7 @@ def wide(request):
 def planned(raw, grid, tolerance, *, wrap=False, skip=True, beam=None, on=WIDE, **changes):
     """A task, its plan by shared lines with some of its fields changed, and the tiling."""
     task = make_task(raw, grid, None, None, wrap, skip, beam)
-    made = _shared_line_plan.choose(
-        tolerance, grid, task.antennas, n_samples=raw.n_samples, bandwidth=float(raw.bandwidth.max()),
-        highest=task.highest, on=on,
-    )  # fmt: skip
+    made = _shared_line_plan.choose(task, tolerance, on)
     assert isinstance(made, SharedLinePlan), "no plan by shared lines meets the tolerance"
     made = replace(made, **changes)
     return task, made, direct.LineTiling(grid, made.side)
@@ -225,13 +222,13 @@ def test_the_profile_of_a_line_holds_its_curvature(squint, left, bistatic):
     """Half paths in float64: along a line they grow by a step and by the bend; what is left is what is predicted."""
     raw = spaceborne(n_rows=9, squint=squint, bistatic=bistatic)
     antennas, side = make_task(raw, PLANE, None, None, False, True).antennas, 64
-    steps = line_plan.steps(sarcl.ImageGrid.plane(shape=(64, 64), spacing=PLANE.spacing))
-    directions = line_plan.SampledDirections.at(np.zeros((1, 3)), antennas.tx, antennas.rx, steps)
+    steps = _line_curvature.steps(sarcl.ImageGrid.plane(shape=(64, 64), spacing=PLANE.spacing))
+    directions = _line_curvature.SampledDirections.at(np.zeros((1, 3)), antennas.tx, antennas.rx, steps)
     bend = directions.bend(PLANE.spacing)
-    held, rest = directions.held(side, PLANE.spacing, bend), directions.rest(side, PLANE.spacing)
+    held, rest = directions.bent_part(side, PLANE.spacing, bend), directions.rest(side, PLANE.spacing)
     mean = directions.along.mean(axis=2)[0]
     turned = np.abs(mean[:, 1]) > np.abs(mean[:, 0])
-    i, j = side / 2 * line_plan.EDGE
+    i, j = side / 2 * _line_curvature.EDGE
 
     def half_path(row, i, j):
         x, y = np.where(turned[row], i, j) * PLANE.spacing[1], np.where(turned[row], j, i) * PLANE.spacing[0]
@@ -244,7 +241,7 @@ def test_the_profile_of_a_line_holds_its_curvature(squint, left, bistatic):
         grown = along * j + bend[0, row] * ((place + j) ** 2 - place**2)
         exact = half_path(row, i, j) - half_path(row, i, 0 * j)
         assert np.abs(exact - grown - (rest - held)[0, row]).max() < 1e-8
-    plain, bent = (line_plan.unmodelled_shift(r) for r in (rest, rest - held))
+    plain, bent = (_line_curvature.unmodelled_shift(r) for r in (rest, rest - held))
     assert bent < left * plain
 
 

@@ -13,7 +13,7 @@ from helpers.devices import as_gpu
 import sarcl
 from sarcl.imaging import backproject as backproject_file
 from sarcl.imaging.engine import RowProfiles
-from sarcl.imaging.run._shares import Shares
+from sarcl.imaging.run._shares import Shares, Worker
 from sarcl.opencl.choose_device import open_device
 from sarcl.opencl.device import Device
 
@@ -32,10 +32,8 @@ def simulate(speeds, *, rates=None, todo=((0, 400),), profiles=0.0, least=0.0, m
     """Devices of so many pixels per second, which need `profiles` seconds before each block: their blocks, and when
     each ends. rates: what is believed of the speeds beforehand."""
     n, time = len(speeds), 0.0
-    shares = Shares(
-        Bands(), list(todo), most=most, unit=unit, ends=ends or [set()] * n, least=[least] * n,
-        rates=list(rates or speeds), now=lambda: time,
-    )  # fmt: skip
+    devices = [Worker(end, least, rate) for end, rate in zip(ends or [set()] * n, rates or speeds, strict=True)]
+    shares = Shares(Bands(), list(todo), devices, most=most, unit=unit, now=lambda: time)
     blocks, end, running = [[] for _ in range(n)], [0.0] * n, {}
     events = [(0.0, k) for k in range(n)]
     while events:

@@ -8,7 +8,7 @@ import pytest
 import sarcl
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.phase_correction import _phase_smoothing, _smooth_search
-from sarcl.phase_correction._hold_out import _near_and_far
+from sarcl.phase_correction._echo_parts import near_and_far
 from sarcl.phase_correction.autofocus import _aperture_view
 
 N, CARRIER, BANDWIDTH, SAMPLES = 64, 24e9, 0.75e9, 32  # pulses, Hz, Hz, samples
@@ -27,7 +27,7 @@ def sets(cells, amplitudes):
     view = _aperture_view(raw, np.arange(N)[:, None], GRID)
     places = np.stack([4.0 + CELL * np.array(cells), np.zeros(len(cells)), np.zeros(len(cells))], axis=1)
     values = np.tile(np.array(amplitudes, np.complex64), (N, 1))
-    near, far = _near_and_far(view, places, [values, values], np.zeros(N))
+    near, far = near_and_far(view, places, [values, values], np.zeros(N))
     return np.flatnonzero(near).tolist(), np.flatnonzero(far).tolist()
 
 

@@ -20,8 +20,8 @@ def size(progression: str, n: Any, frequency_step: Any) -> tuple[Any, Any]:
     pair = progression == "planar"
     for name, value in (("n", n), ("frequency_step", frequency_step)):
         if (np.shape(value) == (2,)) != pair:
-            wanted = "two values, along the track and z" if pair else "one value: two go with progression 'planar'"
-            raise ValueError(f"{name} is {value!r:.60}; progression {progression!r} takes {wanted}")
+            form = "two values, along the track and z" if pair else "one value: two go with progression 'planar'"
+            raise ValueError(f"{name} is {value!r:.60}; progression {progression!r} takes {form}")
     counts = [validation.count("n", value, 1 if pair else 2) for value in (n if pair else (n,))]
     steps = [validation.number("frequency_step", value) for value in (frequency_step if pair else (frequency_step,))]
     if all(step == 0 or count == 1 for count, step in zip(counts, steps, strict=True)):
@@ -32,7 +32,7 @@ def size(progression: str, n: Any, frequency_step: Any) -> tuple[Any, Any]:
     return (tuple(counts), tuple(steps)) if pair else (counts[0], steps[0])
 
 
-def groups_of(progression: str, groups: Any, steer: float, receive: str) -> int | None:
+def groups_of(progression: str, groups: object, steer: float, receive: str) -> int | None:
     """The number of groups, None without groups. ValueError for options that exclude each other."""
     if progression != "subarrays":
         if groups is not None or steer:
@@ -69,19 +69,17 @@ def subarrays(line: AntennaArray, groups: int, center: float, look: np.ndarray) 
 
     The weights of a subarray add up to 1 along `look`, so that it is as strong as one element there.
     """
-    made, each = line.subarrays(groups), line.n // groups
-    places = made.positions - made.positions[:each].mean(axis=0)
+    grouped, each = line.subarrays(groups), line.n // groups
+    places = grouped.positions - grouped.positions[:each].mean(axis=0)
     off = places - np.repeat(_middles(places, groups), each, axis=0)
-    cycles = (center + made.offsets[0]) * (off @ look) / SPEED_OF_LIGHT
-    return replace(made, positions=places, weights=np.exp(-2j * np.pi * cycles) / each)
+    cycles = (center + grouped.offsets[0]) * (off @ look) / SPEED_OF_LIGHT
+    return replace(grouped, positions=places, weights=np.exp(-2j * np.pi * cycles) / each)
 
 
 def as_channels(array: AntennaArray, groups: int) -> AntennaArray:
     """One element per group, at its middle."""
     each = array.n // groups
-    return AntennaArray(
-        positions=_middles(array.positions, groups), offsets=array.offsets[:, ::each], plan=array.plan
-    )  # fmt: skip
+    return AntennaArray(positions=_middles(array.positions, groups), offsets=array.offsets[:, ::each], plan=array.plan)
 
 
 def _middles(places: np.ndarray, groups: int) -> np.ndarray:

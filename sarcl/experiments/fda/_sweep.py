@@ -8,6 +8,7 @@ from math import prod
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ...base import text, validation
 from .case import Case
@@ -48,9 +49,9 @@ def cases(fields: Mapping[str, Any], values: Mapping[str, Any]) -> list[Case]:
     varied = [name for name in lists if name != "bandwidth" or np.ndim(values["bandwidth"])]
     if not varied:
         raise ValueError("bandwidth alone sweeps nothing; give frequency_step or n a list of values")
-    count = prod(len(some) for some in lists.values())
+    count = prod(len(combination) for combination in lists.values())
     if count > MOST:
-        sizes = " x ".join(str(len(some)) for some in lists.values())
+        sizes = " x ".join(str(len(combination)) for combination in lists.values())
         raise ValueError(f"the sweep makes {sizes} = {count} cases; at most {MOST} are run: give fewer values")
     out = []
     for chosen in product(*lists.values()):
@@ -66,7 +67,7 @@ def cases(fields: Mapping[str, Any], values: Mapping[str, Any]) -> list[Case]:
     return out
 
 
-def shown(name: str, value: Any) -> str:
+def shown(name: str, value: ArrayLike | None) -> str:
     """A value with its unit as text, or a word."""
     unit, scale = UNITS.get(name, ("", 1.0))
     if value is None or isinstance(value, (bool, str)):
@@ -94,12 +95,12 @@ def _whole(fields: Mapping[str, Any], given: dict[str, Any]) -> dict[str, Any]:
         return given
     given = dict(given)
     band = validation.number("bandwidth", given.pop("bandwidth"), above=0)
-    known = {"progression": Case.progression, "frequency_step": Case.frequency_step, **fields, **given}
-    if known["progression"] == "planar":
+    fields_in_force = {"progression": Case.progression, "frequency_step": Case.frequency_step, **fields, **given}
+    if fields_in_force["progression"] == "planar":
         raise ValueError("bandwidth is kept for one row of elements; give a planar array's n and frequency_step")
     if "n" in given:
         return {**given, "frequency_step": band / validation.count("n", given["n"], 2)}
-    step = validation.number("frequency_step", known["frequency_step"])
+    step = validation.number("frequency_step", fields_in_force["frequency_step"])
     n = band / abs(step) if step else 0.0
     if n < 1.5 or abs(n - round(n)) > 1e-6:
         raise ValueError(

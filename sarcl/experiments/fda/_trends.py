@@ -57,8 +57,8 @@ def _table(cases: Sequence[Result]) -> html.Block:
         values = [shown(key, value) for key, value in case["swept"].items()]
         for name in _names(cases):
             if name in case["mapped"]:
-                found = [(form, value(case["mapped"][name])) for _, form, value in QUANTITIES]
-                rows.append([*values, name, *("none" if v is None else form.format(v) for form, v in found)])
+                row_of = [(form, value(case["mapped"][name])) for _, form, value in QUANTITIES]
+                rows.append([*values, name, *("none" if v is None else form.format(v) for form, v in row_of)])
             elif name in case["not_applicable"]:
                 rows.append([*values, name, "not applicable", *[""] * (len(QUANTITIES) - 1)])
     head = [*cases[0]["swept"], "mapping", *(title for title, _, _ in QUANTITIES)]

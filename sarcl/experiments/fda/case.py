@@ -107,7 +107,7 @@ class Case:
         self._carriers()
         self._window()
 
-    def _put(self, name: str, value: Any) -> None:
+    def _put(self, name: str, value: object) -> None:
         object.__setattr__(self, name, value)
 
     def _geometry(self) -> None:
@@ -218,20 +218,20 @@ class Case:
         along = self.aperture * (np.arange(self.n_pulses) / (self.n_pulses - 1) - 0.5)
         middle, times = np.array([-self.ground, 0.0, self.height]), np.arange(self.n_pulses)
         if self.path == "line":
-            made = Trajectory(times, middle + along[:, None] * self.ahead)
+            line = Trajectory(times, middle + along[:, None] * self.ahead)
         else:
             turn = _about_z(-along / self.ground)
-            made = Trajectory(times, turn @ middle, attitude=turn)
-        return _moved(made, -self.phase_centers.mean(axis=0)) if self.is_wide else made
+            line = Trajectory(times, turn @ middle, attitude=turn)
+        return _moved(line, -self.phase_centers.mean(axis=0)) if self.is_wide else line
 
     def array(self) -> AntennaArray:
         """The array and its carriers in all pulses."""
-        made = make(self.progression, self.n, self.frequency_step, self.step, self.ahead)
+        elements = make(self.progression, self.n, self.frequency_step, self.step, self.ahead)
         if self.groups is not None:
             level, turn = self.ground / self.distance, self.steer
             look = np.array([level * np.cos(turn), level * np.sin(turn), -self.height / self.distance])
-            made = subarrays(made, self.groups, self.center, look)
-        return made.mirrored(self.n_pulses // 2, self.n_pulses) if self.mirrored else made
+            elements = subarrays(elements, self.groups, self.center, look)
+        return elements.mirrored(self.n_pulses // 2, self.n_pulses) if self.mirrored else elements
 
     def channels(self) -> AntennaArray:
         """One element per channel: the array; of subarrays each group as one element at its middle."""
@@ -255,12 +255,15 @@ class Case:
             return self._echo(places, chirp, _moved(self.track(), self.phase_centers.mean(axis=0)), device)
         channels = self.channels()
         alike = AntennaArray(positions=channels.positions, offsets=np.zeros((1, channels.n)))
-        return self._echo(
-            places, chirp, self.track(), device, array=alike, channels="separated", receive=self.receive
-        )  # fmt: skip
+        return self._echo(places, chirp, self.track(), device, array=alike, channels="separated", receive=self.receive)
 
     def _echo(
-        self, places: Sequence[float], waveform: Waveform, track: Trajectory, device: Any, **options: Any
+        self,
+        places: Sequence[float],
+        waveform: Waveform,
+        track: Trajectory,
+        device: DeviceChoice | None,
+        **options: Any,
     ) -> PhaseHistory:
         return echo(
             Scene.points([[0.0, y, 0.0] for y in places]), waveform, track, reference=(0, 0, 0), check=False,

@@ -42,12 +42,12 @@ STEPS = 24  # samples of a cut per null of the conventional antenna
 DRAWN = 2000  # spatial frequencies that are kept, for plots
 RESOLVED = 3.0  # dB: least dip between two points that are resolved, and of other peaks below the lower of the two
 ALIKE = 0.2  # dB; dips that differ by less count as equal
-NEAR = 0.25  # of the null: distance from two points within which their peaks must lie
+NEAR = 0.25  # share of the null: distance from two points within which their peaks must lie
 WEAK = -6.0  # dB of a unit point in focus: a weaker peak is a side lobe, or of a smeared point
 
 
 class Pair(TypedDict):
-    """What a cut shows of two points: see `pair`."""
+    """Response of two points on a cut: see `pair`."""
 
     dip_db: float
     shift: float | None
@@ -101,8 +101,10 @@ def measure(case: Case, device: DeviceChoice | None = None) -> dict[str, Any]:
     for separation in case.separations:
         for name, raw in _mapped(case, [-separation / 2, separation / 2], refused, device):
             at, values = cut(raw, case, 0.0, device)
-            found = pair(at, values, separation)
-            rows[name]["dips"].append({"separation": separation, **found, "resolved": is_resolved(found, case.null)})
+            response_of_pair = pair(at, values, separation)
+            rows[name]["dips"].append(
+                {"separation": separation, **response_of_pair, "resolved": is_resolved(response_of_pair, case.null)}
+            )
     for row in rows.values():
         row["told_apart"] = told_apart(row["dips"], case.null)
     setting = {name: getattr(case, name) for name in Case.__dataclass_fields__}
@@ -113,7 +115,7 @@ def measure(case: Case, device: DeviceChoice | None = None) -> dict[str, Any]:
 
 
 def _mapped(
-    case: Case, places: Sequence[float], refused: dict[str, str], device: Any
+    case: Case, places: Sequence[float], refused: dict[str, str], device: DeviceChoice | None
 ) -> Iterator[tuple[str, PhaseHistory]]:
     """Name and echoes of the conventional antenna and of every mapping that applies; `refused` gets the others."""
     yield CONVENTIONAL, case.conventional(places, device)
@@ -145,10 +147,10 @@ def cut(raw: PhaseHistory, case: Case, y: float, device: DeviceChoice | None = N
     from ...model.image_grid import ImageGrid
 
     step = case.null / STEPS
-    at = y + step * np.arange(-int(REACH * STEPS), int(REACH * STEPS) + 1)
-    grid = ImageGrid.points(np.stack([0 * at, at, 0 * at], axis=1))
+    positions = y + step * np.arange(-int(REACH * STEPS), int(REACH * STEPS) + 1)
+    grid = ImageGrid.points(np.stack([0 * positions, positions, 0 * positions], axis=1))
     image = backproject(raw, grid, tolerance=1e-3, check=False, device=device)
-    return at, np.abs(image.normalized())
+    return positions, np.abs(image.normalized())
 
 
 def response(at: np.ndarray, values: np.ndarray, place: float) -> dict[str, float]:
@@ -160,20 +162,20 @@ def response(at: np.ndarray, values: np.ndarray, place: float) -> dict[str, floa
 
     fine = np.linspace(at[0], at[-1], 8 * len(at))
     power = np.maximum(CubicSpline(at, values**2)(fine), 1e-12 * values.max() ** 2)
-    peak = left = right = int(power.argmax())
-    while left > 0 and power[left - 1] < power[left]:
-        left -= 1
+    peak = before = right = int(power.argmax())
+    while before > 0 and power[before - 1] < power[before]:
+        before -= 1
     while right < len(power) - 1 and power[right + 1] < power[right]:
         right += 1
-    half = np.flatnonzero(power[left : right + 1] >= power[peak] / 2) + left
-    sides = np.concatenate([power[:left], power[right + 1 :]])
+    half = np.flatnonzero(power[before : right + 1] >= power[peak] / 2) + before
+    sides = np.concatenate([power[:before], power[right + 1 :]])
     return {
         "error": _vertex(fine, power, peak) - place,
         "level_db": float(10 * np.log10(power[peak])),
-        "null": (_vertex(fine, power, right) - _vertex(fine, power, left)) / 2,
+        "null": (_vertex(fine, power, right) - _vertex(fine, power, before)) / 2,
         "irw": _crossing(fine, power, half[-1], 1) - _crossing(fine, power, half[0], -1),
         "pslr_db": float(10 * np.log10(sides.max(initial=1e-12 * power[peak]) / power[peak])),
-        "islr_db": float(10 * np.log10(max(sides.sum(), 1e-12 * power[peak]) / power[left : right + 1].sum())),
+        "islr_db": float(10 * np.log10(max(sides.sum(), 1e-12 * power[peak]) / power[before : right + 1].sum())),
         "inside": bool(0 < peak < len(power) - 1),
     }
 
@@ -195,12 +197,12 @@ def _crossing(x: np.ndarray, power: np.ndarray, i: int, side: int) -> float:
 
 
 def dip(at: np.ndarray, values: np.ndarray, separation: float) -> float:
-    """How far the image falls between two points, dB below the lower of their peaks; 0 where there is only one peak."""
+    """Fall of the image between two points, dB below the lower of their peaks; 0 where there is only one peak."""
     return float(pair(at, values, separation)["dip_db"])
 
 
 def pair(at: np.ndarray, values: np.ndarray, separation: float) -> Pair:
-    """What a cut, m (n,) and amplitudes of a unit point (n,), shows of two points `separation` m apart about 0.
+    """Response on a cut, m (n,) and amplitudes of a unit point (n,), of two points `separation` m apart about 0.
 
     dip_db    the `dip`, dB;  level_db  the lower of the two peaks, dB
     shift     larger distance of the two peaks from their points, m
@@ -299,8 +301,8 @@ def _support(found: np.ndarray) -> dict[str, Any]:
 
 def spatial_frequencies(raw: PhaseHistory, most: int = 40) -> np.ndarray:
     """K = f/c (u_T + u_R) at the origin, of up to `most` samples per row, cycles/m (n, 2): along x and y."""
-    some = spread_over(raw.n_samples, most)
-    f = raw.frequency[:, None] + raw.frequency_step[:, None] * some
+    rows = spread_over(raw.n_samples, most)
+    f = raw.frequency[:, None] + raw.frequency_step[:, None] * rows
     look = unit(raw.tx) + unit(raw.rx)
     return np.asarray((f[:, :, None] / SPEED_OF_LIGHT * look[:, None, :2]).reshape(-1, 2))
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...base import text, validation
+from ...base.types import PathLike
 from ...io import input_paths, toml
 from ._sweep import KEYS as SWEPT
 from ._sweep import cases
@@ -18,7 +19,7 @@ ANGLES = ("squint", "steer")
 TABLES = ["fda", "case", "sweep"]
 
 
-def load(path: Any) -> tuple[str, list[Case]]:
+def load(path: PathLike) -> tuple[str, list[Case]]:
     """Title and cases of a TOML file: [fda] holds `title` and the keys that all cases share, each [[case]] its own.
 
     Without a [[case]] the shared table is the only case. [sweep] makes of each case one case per combination of its
@@ -37,11 +38,11 @@ def load(path: Any) -> tuple[str, list[Case]]:
             raise ValueError(f"{path}: {name} is {tables[name]!r:.60}; it is a table, written [{name}]")
     shared = dict(tables.get("fda", {}))
     title = shared.pop("title", "Frequency-diverse apertures")
-    given = tables.get("case", [{}])
-    if not isinstance(given, list) or not all(isinstance(table, dict) for table in given):
+    case_tables = tables.get("case", [{}])
+    if not isinstance(case_tables, list) or not all(isinstance(table, dict) for table in case_tables):
         raise ValueError(f"{path}: cases are written [[case]], one table each")
     out: list[Case] = []
-    for i, table in enumerate(given):
+    for i, table in enumerate(case_tables):
         where = f"{path}: case {i + 1}"
         fields = {"name": f"case {i + 1}", **_plain({**shared, **table}, (*KEYS, "name"), where)}
         try:
@@ -69,13 +70,13 @@ def _plain(table: dict[str, Any], known: tuple[str, ...], where: str) -> dict[st
     return out
 
 
-def _tuples(value: Any) -> Any:
+def _tuples(value: object) -> object:
     return tuple(_tuples(v) for v in value) if isinstance(value, list) else value
 
 
-def _radians(key: str, value: Any, where: str) -> Any:
+def _radians(key: str, value: object, where: str) -> float | tuple[float, ...]:
     try:
-        found = [float(np.deg2rad(validation.number(key, v))) for v in (value if isinstance(value, list) else [value])]
+        angles = [float(np.deg2rad(validation.number(key, v))) for v in (value if isinstance(value, list) else [value])]
     except ValueError as exc:
         raise ValueError(f"{where}: {exc}") from None
-    return tuple(found) if isinstance(value, list) else found[0]
+    return tuple(angles) if isinstance(value, list) else angles[0]

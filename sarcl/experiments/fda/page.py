@@ -65,8 +65,8 @@ def html(
     if not finished:
         blocks.insert(1, words("Not finished: more cases follow.", True))
     blocks += _trends.summary(results, finished)
-    for made in sections or map(section, results):
-        blocks += made
+    for blocks_of_cases in sections or map(section, results):
+        blocks += blocks_of_cases
     return page(title, blocks, command)
 
 
@@ -84,12 +84,14 @@ def section(result: Result, level: int = 2) -> list[Block]:
         *_supports(result),
         table(
             ["mapping", "aperture, m", "gap, m", "spread of spatial frequencies, cycles/m", *WIDTHS],
-            [[name, f"{row['length']:.1f}", f"{row['gap']:.1f}", f"{row['claimed']:.3f}", *_widths(row["points"][0])]
-             for name, row in rows.items()],
+            [
+                [name, f"{row['length']:.1f}", f"{row['gap']:.1f}", f"{row['claimed']:.3f}", *_widths(row["points"][0])]
+                for name, row in rows.items()
+            ],
             f"A point at y = {points[0]:g} m, focused alone. Aperture and gap: length of the track from which the "
             "echoes are focused, and the largest gap in it.",
         ),
-    ]  # fmt: skip
+    ]
     if len(points) > 1:
         blocks.append(table(
             ["mapping", "y, m", "error of position, m", "peak, dB", *WIDTHS],
@@ -97,20 +99,23 @@ def section(result: Result, level: int = 2) -> list[Block]:
              for i in range(1, len(points)) for name, row in rows.items() for p in [row["points"][i]]],
             "Points elsewhere, each focused alone.",
         ))  # fmt: skip
-    blocks.append(table(
-        ["mapping", *(f"{s:g} m apart" for s in separations)],
-        [[name, *(_dip(d, result["resolved_if"]["shift"]) for d in row["dips"])] for name, row in rows.items()],
+    head = ["mapping", *(f"{s:g} m apart" for s in separations)]
+    cells = [[name, *(_dip(d, result["resolved_if"]["shift"]) for d in row["dips"])] for name, row in rows.items()]
+    caption = (
         "Two equal points in phase about the centre: dip between their peaks, dB, and whether they are resolved; where "
         "the dip alone would resolve them, the number of peaks, or their largest error of position, or their level. "
-        f"Resolved here: {rule(result['null'])}.",
-    ))  # fmt: skip
+        f"Resolved here: {rule(result['null'])}."
+    )
+    blocks.append(table(head, cells, caption))
     return blocks
 
 
 def _caption_of_dips(rows: Mapping[str, Any]) -> str:
     text = "Dip between two points against their separation, up to 40 dB."
-    deep = {name: [f"{d['separation']:g}" for d in row["dips"] if d["dip_db"] >= RESOLVED and not d["resolved"]]
-            for name, row in rows.items()}  # fmt: skip
+    deep = {
+        name: [f"{d['separation']:g}" for d in row["dips"] if d["dip_db"] >= RESOLVED and not d["resolved"]]
+        for name, row in rows.items()
+    }
     some = "; ".join(f"{name} at {', '.join(at)} m" for name, at in deep.items() if at)
     return f"{text} Not resolved in spite of their dip: {some}." if some else text
 
@@ -118,8 +123,10 @@ def _caption_of_dips(rows: Mapping[str, Any]) -> str:
 def _supports(result: Result) -> list[Block]:
     """Plots of spatial frequencies: collected, of the conventional antenna, and implied by the apparent positions."""
     rows = result["mapped"]
-    clouds = [("collected", result["collected"], "Spatial frequencies collected"),
-              (CONVENTIONAL, rows[CONVENTIONAL], "Spatial frequencies of the conventional antenna")]  # fmt: skip
+    clouds = [
+        ("collected", result["collected"], "Spatial frequencies collected"),
+        (CONVENTIONAL, rows[CONVENTIONAL], "Spatial frequencies of the conventional antenna"),
+    ]
     if "apparent" in rows:
         clouds.append(("apparent", rows["apparent"], "Spatial frequencies implied by the apparent positions"))
     out = []

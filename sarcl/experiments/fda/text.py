@@ -10,7 +10,7 @@ import numpy as np
 from .experiment import CONVENTIONAL, NEAR, RESOLVED, WEAK, Pair, is_resolved, nearer
 
 SAME = 0.02  # relative difference below which two widths count as equal
-DISPLACED = 0.1  # of the null: smaller errors of position are not worth a sentence
+DISPLACED = 0.1  # share of the null: smaller errors of position are not worth a sentence
 RECEIVERS = {
     "reference": "One receiver, at the reference element.",
     "own": "Every element receives its own channel.",
@@ -19,7 +19,7 @@ RECEIVERS = {
 
 
 def rule(null: float | None = None) -> str:
-    """What two points that are resolved are, with its tolerances; null: of the conventional antenna, m."""
+    """Rule by which two points are resolved, with its tolerances; null: of the conventional antenna, m."""
     place = f"{NEAR:g} times the conventional antenna's null" if null is None else f"{NEAR * null:.3f} m"
     return (
         f"as many peaks as points: a dip of {RESOLVED:g} dB or more between two peaks, each within {place} of its "
@@ -50,7 +50,7 @@ def unresolved(found: Pair, null: float) -> list[str]:
 
 
 def conclusion(results: Sequence[Mapping[str, Any]]) -> list[str]:
-    """What the mappings gained over the conventional antenna in all cases: a sentence, then a line per mapping."""
+    """Gains of the mappings over the conventional antenna in all cases: a sentence, then a line per mapping."""
     names, better, lines = mappings_of(results), [], []
     for name in names:
         cases = [case for case in results if name in case["mapped"]]
@@ -119,8 +119,9 @@ def _array(result: Mapping[str, Any]) -> str:
     }.get(kind, "")
     switch = (
         "; from mid-aperture on the carriers run in reverse over the elements, at the same centre frequency"
-        if result["mirrored"] else ""
-    )  # fmt: skip
+        if result["mirrored"]
+        else ""
+    )
     apart = f"{result['spacing']:.4g} m" if result["spacing"] >= 1 else f"{1e3 * result['spacing']:.4g} mm"
     text = (
         f"{' x '.join(str(i) for i in np.atleast_1d(n))} elements {apart} apart {where}, with carriers from "
@@ -163,7 +164,7 @@ def _beside(result: Mapping[str, Any]) -> str:
 
 
 def verdicts(result: Mapping[str, Any]) -> list[str]:
-    """What each mapping gained or lost against the conventional antenna; why other mappings do not apply."""
+    """Gain or loss of each mapping against the conventional antenna; why other mappings do not apply."""
     rows, null = result["mapped"], result["null"]
     out = [f"{name}: {_verdict(row, rows[CONVENTIONAL], null)}" for name, row in rows.items() if name != CONVENTIONAL]
     return out + [f"{name}: not applicable. {reason}." for name, reason in result["not_applicable"].items()]
@@ -220,7 +221,7 @@ def _apart(row: Mapping[str, Any]) -> str:
 
 
 def _spoiled(row: Mapping[str, Any], null: float) -> str:
-    """Why a dip of enough decibels does not resolve two points: all reasons, of the first such dip."""
+    """Reasons why a dip of enough decibels does not resolve two points: all, of the first such dip."""
     for found in row["dips"]:
         counted = row["told_apart"] is not None and found["separation"] >= row["told_apart"]
         if found["dip_db"] < RESOLVED or counted:

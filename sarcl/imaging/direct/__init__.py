@@ -8,6 +8,7 @@ For other folders:
 
 For this folder alone:
 
+    _line_curvature     difference of the curvature of wavefronts over a tile and a group of pulses
     _shared_line_plan   plan of backprojection by lines that a work-group shares
 """
 

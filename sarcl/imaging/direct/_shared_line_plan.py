@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterator
 from dataclasses import dataclass
 
-from ...model.image_grid import ImageGrid
 from ...numerics import cost_model, error_bounds, interpolation
 from ...numerics.cost_model import DeviceClass
 from ...numerics.interpolation import Interpolator
-from ...numerics.pulse_geometry import PulseGeometry
-from .line_plan import FINES, MOST_CHOSEN, MOST_FIXED, LinePlan, curvatures, profile_interpolator, series
+from ..focusing_task import FocusingTask
+from ._line_curvature import GroupCurvature, curvatures
+from .line_plan import FINES, MOST_CHOSEN, MOST_FIXED, SAMPLING_MARGIN, LinePlan, profile_interpolator, series
 
 SIDES = (64, 32)  # pixels along a side of a tile
 GROUP_SIZES = (64, 32, 16, 8)  # pulses per group
+SLOPE_TAPS = (0, 2, 4, 6, 8)  # taps of the slopes of weights; 0: positions are not shifted
+SAMPLED_SIDES = 1.4  # sides of a tile that the samples of a line reach over, without those of its taps
 CHUNK = 64  # pulses added in float32 before the compensated total
 PER_ITEM = 16  # pixels of a work-item
 PIXELS = 4  # neighbouring ones among them: PIXELS of the kernel
@@ -22,7 +25,7 @@ MOST_LOCAL = 48 * 1024  # bytes of local memory that any NVIDIA device gives to 
 
 @dataclass(frozen=True, eq=False)
 class SharedLinePlan(LinePlan):
-    """As LinePlan, for lines that a work-group shares.
+    """LinePlan of lines that a work-group shares.
 
     slopes  interpolator whose weights' slopes shift the positions of pixels; None: none do
     native  sine and cosine are the device's own
@@ -61,57 +64,69 @@ def local_bytes(side: int, fine: int, taps: int, slope_taps: int) -> int:
     return 2 * (8 * rows * columns + 8 * side * taps + max(8 * side * slope_taps, 16) + 4 * side)
 
 
-def choose(
-    tolerance: float,
-    grid: ImageGrid,
-    antennas: PulseGeometry,
-    *,
-    n_samples: int,
-    bandwidth: float,
-    highest: float,
-    on: DeviceClass,
-) -> SharedLinePlan | None:
+def choose(task: FocusingTask, tolerance: float, devices: DeviceClass) -> SharedLinePlan | None:
     """The cheapest SharedLinePlan whose predicted error is at most `tolerance`, or None.
 
-    highest  highest frequency, Hz
-    on       the devices that follow the plan: their local memory holds two pulses
+    devices  those that follow the plan: their local memory holds two pulses
     """
-    distance = antennas.distance(grid.bounds)
-    best: SharedLinePlan | None = None
-    choices = list(itertools.product(SIDES, GROUP_SIZES))
-    for side, group, curvature in curvatures(grid, antennas, choices, highest, distance, bent=True):
-        radius = curvature.radius
-        order, fixed = series(tolerance, radius, distance, highest)
-        # sines and cosines: of T; of weights, whose taps are turned by another; and of each turn of a sum
-        turns = CHUNK // group
-        fixed += error_bounds.phase_rounding(0.0, highest, True) * (3 + turns)
-        native = on.native_pays(tolerance)
-        fixed += (3 + turns) * on.native_error if native else 0.0
-        fixed += error_bounds.two_part_position_rounding(radius, distance, bandwidth)
-        fixed += 2 * error_bounds.curvature_rounding(radius, distance, highest)
-        if not fixed <= MOST_FIXED * tolerance:
+    tiles = list(itertools.product(SIDES, GROUP_SIZES))
+    plans = (
+        plan
+        for curvature in curvatures(task, task.antennas, tiles, is_bent=True)
+        for plan in _plans(task, tolerance, curvature, devices)
+    )
+    return min(plans, key=lambda plan: plan.cost, default=None)
+
+
+def _plans(
+    task: FocusingTask, tolerance: float, curvature: GroupCurvature, devices: DeviceClass
+) -> Iterator[SharedLinePlan]:
+    """Plans for one side of tiles and number of pulses per group, whose predicted errors are at most `tolerance`."""
+    side, group, n_samples, n_pixels = curvature.side, curvature.group, task.raw.n_samples, task.grid.size
+    order, fixed = series(tolerance, curvature, task.highest)
+    # sines and cosines: of T; of weights, whose taps are turned by another; and of each turn of a sum
+    n_rotations = 3 + CHUNK // group
+    fixed += error_bounds.phase_rounding(0.0, task.highest, True) * n_rotations
+    native = devices.native_pays(tolerance)
+    fixed += n_rotations * devices.native_error if native else 0.0
+    fixed += error_bounds.two_part_position_rounding(curvature.radius, curvature.distance, task.bandwidth)
+    fixed += 2 * error_bounds.curvature_rounding(curvature.radius, curvature.distance, task.highest)
+    if not fixed <= MOST_FIXED * tolerance:
+        return
+    fixed += curvature.phase_error + error_bounds.sum_rounding(CHUNK, n_samples)
+    shift, cells = curvature.shift(task.bandwidth), curvature.bent_cells(task.bandwidth)
+    for fine, taps, slope_taps in itertools.product(FINES, interpolation.LINE_TERMS, SLOPE_TAPS):
+        if cells * SAMPLING_MARGIN >= fine or slope_taps > taps:
             continue
-        fixed += curvature.phase_error + error_bounds.sum_rounding(CHUNK, n_samples)
-        shift, cells = curvature.shift(bandwidth), curvature.bent_cells(bandwidth)
-        for fine, taps, slope_taps in itertools.product(FINES, interpolation.LINE_TERMS, (0, 2, 4, 6, 8)):
-            if cells * 1.2 >= fine or slope_taps > taps or local_bytes(side, fine, taps, slope_taps) > on.local_memory:
-                continue
-            line = interpolation.line_interpolator(taps, fine / cells)
-            slopes = interpolation.line_interpolator(slope_taps, fine / cells) if slope_taps else None
-            shifted = shift**2 / 2 + shift * interpolation.slope_error(slopes) if slopes else shift
-            error = fixed + line.error + shifted
-            if not error <= MOST_CHOSEN * tolerance:
-                continue
-            samples = fine * 1.4 * side + taps + 4  # of T
-            found = profile_interpolator(tolerance - error, n_samples, grid.size * samples / side**2)
-            if found is None:
-                continue
-            made, length, _ = found
-            cost = cost_model.shared_lines(side, fine, taps, slope_taps, group, made.taps, samples)
-            cost += cost_model.profile(length) / grid.size
-            if best is None or cost < best.cost:
-                best = SharedLinePlan(
-                    side, fine, group, line, made, length, order, slopes is not None,
-                    *curvature.limits(bandwidth, length / n_samples), error + made.error, cost, slopes, native,
-                )  # fmt: skip
-    return best
+        if local_bytes(side, fine, taps, slope_taps) > devices.local_memory:
+            continue
+        line = interpolation.line_interpolator(taps, fine / cells)
+        slopes = interpolation.line_interpolator(slope_taps, fine / cells) if slope_taps else None
+        shift_error = shift**2 / 2 + shift * interpolation.slope_error(slopes) if slopes else shift
+        error = fixed + line.error + shift_error
+        if not error <= MOST_CHOSEN * tolerance:
+            continue
+        line_samples = fine * SAMPLED_SIDES * side + taps + 4  # of T
+        choice = profile_interpolator(tolerance - error, n_samples, n_pixels * line_samples / side**2)
+        if choice is None:
+            continue
+        interpolator, length, _ = choice
+        cost = cost_model.shared_lines(side, fine, taps, slope_taps, group, interpolator.taps, line_samples)
+        limit_cycles, limit_position, limit_step = curvature.limits(task.bandwidth, length / n_samples)
+        yield SharedLinePlan(
+            side=side,
+            fine=fine,
+            group=group,
+            line=line,
+            interpolator=interpolator,
+            length=length,
+            order=order,
+            slope=slopes is not None,
+            limit_cycles=limit_cycles,
+            limit_position=limit_position,
+            limit_step=limit_step,
+            predicted_error=error + interpolator.error,
+            cost=cost + cost_model.profile(length) / n_pixels,
+            slopes=slopes,
+            native=native,
+        )

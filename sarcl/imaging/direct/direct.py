@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,51 +21,50 @@ from ..focusing_task import FocusingTask
 from ..pixel_taper import TaperOnDevice
 from ..tiling.lines import LineTiling
 from ..tiling.of_grid import tiling_of
-from ..tiling.tiling import Tiling
+from ..tiling.tiling import FlatImage, Tiling
 from . import _shared_line_plan, line_plan
 from .line_plan import LinePlan
-from .tile_kernels import CHUNK, kernel_of
+from .tile_kernels import CHUNK, Block, KernelForm, Profiles, Pulses, kernel_of
+
+if TYPE_CHECKING:
+    from ...opencl.device import Buffer
+
+LEAST_COST = 0.9  # cost per contribution below that of every plan pixel by pixel
 
 
-def make_plan(task: FocusingTask, tolerance: float, on: DeviceClass = CPU) -> tuple[Plan | LinePlan, Tiling]:
+def make_plan(task: FocusingTask, tolerance: float, devices: DeviceClass = CPU) -> tuple[Plan | LinePlan, Tiling]:
     """The cheapest plan whose predicted error is at most `tolerance`, and the tiling of the grid that it uses.
 
-    on  the devices that follow the plan
+    devices  those that follow the plan
     ToleranceUnreachable names the best tolerance that can be met.
     """
-    raw, grid = task.raw, task.grid
-    highest, bandwidth = task.highest, float(raw.bandwidth.max())
-    lined: LinePlan | None = None
+    grid = task.grid
+    by_lines: LinePlan | None = None
     if not task.weighs_pixels and grid.is_plane:  # lines share the weights of their pulses
-        if on.lanes:
-            lined = line_plan.choose(
-                tolerance, grid, task.antennas, n_samples=raw.n_samples, bandwidth=bandwidth, highest=highest
-            )
-        elif on.local_memory and task.pairs >= cost_model.SHARING_PAYS:
-            lined = _shared_line_plan.choose(
-                tolerance, grid, task.antennas, n_samples=raw.n_samples, bandwidth=bandwidth, highest=highest,
-                on=on,
-            )  # fmt: skip
-    if lined is not None and not task.resolves_beam(LineTiling(grid, lined.side).radius):
-        lined = None
-    if lined is not None and lined.cost < 0.9:  # no other plan costs less
-        return lined, LineTiling(grid, lined.side)
+        if devices.lanes:
+            by_lines = line_plan.choose(task, task.antennas, tolerance)
+        elif devices.local_memory and task.pairs >= cost_model.SHARING_PAYS:
+            by_lines = _shared_line_plan.choose(task, tolerance, devices)
+    if by_lines is not None and not task.resolves_beam(LineTiling(grid, by_lines.side).radius):
+        by_lines = None
+    if by_lines is not None and by_lines.cost < LEAST_COST:
+        return by_lines, LineTiling(grid, by_lines.side)
     tilings = {side**2: tiling_of(grid, side) for side in (32, 16, 8)}
     plan = cheapest(
         tolerance,
         [(n, tiling.radius) for n, tiling in tilings.items() if n == 64 or task.resolves_beam(tiling.radius)],
         distance=task.antennas.distance(grid.bounds),
-        frequency=highest,
-        bandwidth=bandwidth,
-        n_samples=raw.n_samples,
+        frequency=task.highest,
+        bandwidth=task.bandwidth,
+        n_samples=task.raw.n_samples,
         points_per_row=grid.size,
         chunk=CHUNK,
         least_tolerance=0.0,
-        gathering=on.gathering,
-        native_error=on.native_error if on.native_pays(tolerance) else None,
+        gathering=devices.gathering,
+        native_error=devices.native_error if devices.native_pays(tolerance) else None,
     )
-    if lined is not None and lined.cost < plan.cost:
-        return lined, LineTiling(grid, lined.side)
+    if by_lines is not None and by_lines.cost < plan.cost:
+        return by_lines, LineTiling(grid, by_lines.side)
     return plan, tilings[plan.per_tile]
 
 
@@ -80,14 +79,16 @@ class Direct(DirectEngine):
         """gain  True: it makes sums of squared gains of the antenna and the rows' weights, instead of an image."""
         self.device, self.task, self.plan, self.tiling = device, task, plan, tiling
         self.lanes = device.info.vector_width
-        bistatic = not task.antennas.is_monostatic
-        beam = task.antennas.beam is not None
         self.taper = TaperOnDevice(device, task, np.float32)
         self.antenna = None if task.antenna is None else AntennaOnDevice(device, task, gain)
-        self.kernels = kernel_of(
-            device, plan, tiling, bistatic=bistatic, wrap=task.wrap, local=False, beam=beam,
+        form = KernelForm(
+            bistatic=not task.antennas.is_monostatic,
+            wrap=task.wrap,
+            local=False,
+            beam=task.antennas.beam is not None,
             weights=self.antenna.macros if self.antenna else self.taper.macros,
-        )  # fmt: skip
+        )
+        self.kernels = kernel_of(device, plan, tiling, form)
         self.profiles = RowProfiles(device, task, plan.interpolator, plan.length)
         # per row, making the range profile costs a tenth of adding it to this many pixels: on a CPU, on a GPU, and on a
         # GPU whose profiles the host makes. For GPUs they are inferred from 2e11 pixels/s: none was measured
@@ -116,7 +117,7 @@ class Direct(DirectEngine):
         return max(1, int(self._shares(nbytes)[1] / (pixel_bytes * self.tiling.per_tile)))
 
     def fill(
-        self, first: int, last: int, flat: Any, budget: float, clock: Clock, on_progress: Callable[[float], None]
+        self, first: int, last: int, flat: FlatImage, budget: float, clock: Clock, on_progress: Callable[[float], None]
     ) -> Skipped:
         """Focus bands first ... last - 1 into `flat`; see engine.Engine."""
         tiling = self.tiling
@@ -129,9 +130,8 @@ class Direct(DirectEngine):
             def rows_done(rows: float, start: int = start, stop: int = stop) -> None:
                 on_progress((start * self.task.raw.n_rows + (stop - start) * rows) / tiles.n_tiles)
 
-            whole = stop - start == tiles.n_tiles
-            some = tiles if whole else tiles.picked(np.arange(start, stop))
-            image, missed = self.add_up(some, budget, clock, rows_done)
+            part = tiles if stop - start == tiles.n_tiles else tiles.picked(np.arange(start, stop))
+            image, missed = self.add_up(part, budget, clock, rows_done)
             tiling.place_sums(self.device, image, (first, last), (start, stop), orders, flat)
             skipped += Skipped.of_tiles(missed, tiling.tile_sizes(first, last)[start:stop])
         clock.lap("write")
@@ -139,7 +139,7 @@ class Direct(DirectEngine):
 
     def add_up(
         self, tiles: Tiles, budget: float, clock: Clock, on_progress: Callable[[float], None]
-    ) -> tuple[Any, np.ndarray]:
+    ) -> tuple[Buffer, np.ndarray]:
         """Add all rows to these tiles: their sums (4, pixels) on the device, and rows left out of each (2, n_tiles)."""
         device, raw, kernels, stride = self.device, self.task.raw, self.kernels, self.profiles.stride
         for_rows, _, for_constants = self._shares(budget)
@@ -156,18 +156,19 @@ class Direct(DirectEngine):
             for start in range(0, raw.n_rows, rows):
                 stop = min(start + rows, raw.n_rows)
                 pipeline.new_block()
-                block = self.profiles.upload(start, stop)
+                profiles = Profiles(self.profiles.upload(start, stop), stride, stride // 2)
                 packed = self.task.antennas.packed(self.tiling.center, self.plan.length, start, stop, self.lanes)
-                pulses = pipeline.upload(packed), packed.shape[2], stop - start
+                pulses = Pulses(pipeline.upload(packed), packed.shape[2], stop - start)
                 weights = self.taper.arguments(apertures, start, stop)
                 if self.antenna:
                     weights = self.antenna.arguments(start, stop)
                 clock.lap("profiles")
                 at_once = int(for_constants / (4 * kernels.components * packed.shape[2] * pipeline.held))
                 step = max(1, min(tiles.n_tiles, at_once))
+                block = Block(pulses, profiles, weights, second)
                 for tile in range(0, tiles.n_tiles, step):
                     end = min(tile + step, tiles.n_tiles)
-                    kernels.add(on, tile, end, pulses, block, stride, stride // 2, 0, image, *weights, second=second)
+                    kernels.add(on, tile, end, block, image)
                     if end < tiles.n_tiles:  # the constants of these tiles are freed before many more are made
                         pipeline.step()
                 pipeline.step(partial(on_progress, stop))

@@ -7,7 +7,8 @@ tile has profiles of its own, relative to its reference point.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -21,16 +22,60 @@ from ..pixel_taper import WEIGHT_BUFFERS
 from ..tiling.lines import LineTiling
 from ..tiling.tiling import Tiling
 from . import _shared_line_plan, line_plan
+from ._line_curvature import steps
 from ._shared_line_plan import SharedLinePlan
-from .line_plan import LinePlan, steps
+from .line_plan import LinePlan
+
+if TYPE_CHECKING:
+    from ...opencl.device import Buffer
 
 CHUNK = 64  # rows added in float32 before the compensated total; blocks of rows are multiples of it
 ENTRY = 24  # numbers that a pulse takes in the record of its group: N_ENTRY of kernels/line_schedule.clh
-NO_WEIGHTS = {"WEIGHT": 0}  # of pulses in the pixels: macros of kernels/pixel_weights.clh
 VECTORS = 4  # vectors of pixels per work-item of the per-pixel kernel
 
-# pulses on the device: the packed array, its length with padding, and the number of pulses
-Pulses = tuple[Any, int, int]
+
+class Pulses(NamedTuple):
+    """Pulses on the device: the packed array, its length with padding, and the number of pulses."""
+
+    buffer: Buffer
+    n: int
+    n_used: int
+
+
+class Profiles(NamedTuple):
+    """Range profiles on the device: samples of one with its padding, the place of delay 0, and the first sample."""
+
+    buffer: Buffer
+    stride: int
+    origin: int
+    offset: int = 0
+
+
+class Block(NamedTuple):
+    """Pulses that are added to tiles, with their range profiles.
+
+    weights  buffers of the pulses' weights in the pixels: `TaperOnDevice.arguments`, `AntennaOnDevice.arguments`
+    second   where the receiving antenna's pattern begins, as AntennaOnDevice has it
+    """
+
+    pulses: Pulses
+    profiles: Profiles
+    weights: tuple[Buffer | None, ...] = ()
+    second: int = 0
+
+
+@dataclass(frozen=True)
+class KernelForm:
+    """Cases that kernels are built for: transmitter and receiver apart, profiles that repeat, or of each tile, a beam.
+
+    weights  of pulses in the pixels: macros of kernels/pixel_weights.clh
+    """
+
+    bistatic: bool
+    wrap: bool
+    local: bool
+    beam: bool
+    weights: Mapping[str, int] = field(default_factory=lambda: {"WEIGHT": 0})
 
 
 class GatherKernel:
@@ -38,16 +83,15 @@ class GatherKernel:
 
     chunk, least_rows = CHUNK, 1
 
-    def __init__(
-        self, device: Device, plan: Plan, tiling: Tiling, *, bistatic: bool, wrap: bool, local: bool, beam: bool,
-        weights: Mapping[str, int] = NO_WEIGHTS,
-    ) -> None:  # fmt: skip
-        self.device, self.beam = device, beam
+    def __init__(self, device: Device, plan: Plan, tiling: Tiling, form: KernelForm) -> None:
+        self.device, self.beam = device, form.beam
         self.lanes = device.info.vector_width
-        macros = {**plan.macros(bistatic, wrap), "LOCAL": int(local), "VECTORS": VECTORS, "CHUNK": CHUNK}
-        macros |= {"BEAM": int(beam), "NATIVE": int(plan.native), **weights}
-        self.components = plan.components(bistatic, beam)
-        self.constants = TileConstants(device, plan, bistatic=bistatic, wrap=wrap, local=local, beam=beam)
+        macros = {**plan.macros(form.bistatic, form.wrap), "LOCAL": int(form.local), "VECTORS": VECTORS, "CHUNK": CHUNK}
+        macros |= {"BEAM": int(form.beam), "NATIVE": int(plan.native), **form.weights}
+        self.components = plan.components(form.bistatic, form.beam)
+        self.constants = TileConstants(
+            device, plan, bistatic=form.bistatic, wrap=form.wrap, local=form.local, beam=form.beam
+        )
         self.kernel = device.kernel("backproject.cl", "backproject", **macros)
         self.group = device.max_group(self.kernel)
         self.table = device.upload(plan.interpolator.table)
@@ -59,48 +103,45 @@ class GatherKernel:
         parts = [float_pairs.wide(tiles.references.T), tiles.radius.astype(np.float32), tiles.offsets]
         return TilesOnDevice(device, tiles, skip, [device.upload(p) for p in parts], self.beam)
 
-    def add(
-        self, on: TilesOnDevice, low: int, high: int, pulses: Pulses, source: Any, stride: int, origin: int,
-        offset: int, image: Any, *weights: Any, second: int = 0,
-    ) -> None:  # fmt: skip
-        """Add a block of pulses to tiles low ... high - 1 of `image` (4, pixels); profiles begin at sample `offset`.
-
-        weights  buffers of the pulses' weights in the pixels: `TaperOnDevice.arguments`, `AntennaOnDevice.arguments`
-        second   where the receiving antenna's pattern begins, as AntennaOnDevice has it
-        """
-        device, (pulse, n, used), tiles = self.device, pulses, on.tiles
+    def add(self, on: TilesOnDevice, low: int, high: int, block: Block, image: Buffer) -> None:
+        """Add a block of pulses to tiles low ... high - 1 of `image` (4, pixels)."""
+        tiles = on.tiles
         centers, radius, offsets = on.buffers
-        constants = self.constants.compute(pulse, n, centers, radius, (low, high), tiles.n_tiles, on.skip)
+        pulses = block.pulses
+        constants = self.constants.compute(
+            pulses.buffer, pulses.n, centers, radius, (low, high), tiles.n_tiles, on.skip
+        )
         items = tiles.per_tile // self.lanes // VECTORS
         assert self.lanes > 1 or items % 16 == 0, "NEIGHBOURS of kernels/backproject.cl have pixels together"
-        device.run(
-            self.kernel, (items, high - low), (items, 1) if items <= self.group else None,
-            launch_numbers(
-                "backproject.cl", "backproject", stride=stride, origin=origin, n=n, n_used=used, n_tiles=tiles.n_tiles,
-                first=low, n_offsets=tiles.offsets.shape[1],
-                offset_step=0 if tiles.shared else tiles.per_tile // self.lanes, pixels=tiles.n_tiles * tiles.per_tile,
-                local_offset=offset, magic=self.magic, second=second,
-            ),
-            source, self.table, pulse, constants, centers, offsets, image, on.missed,
-            *(weights or WEIGHT_BUFFERS * (self.table,)), steps=used,
-        )  # fmt: skip
+        numbers = on.numbers(low, block) | {
+            "n_offsets": tiles.offsets.shape[1],
+            "offset_step": 0 if tiles.shared else tiles.per_tile // self.lanes,
+            "local_offset": block.profiles.offset,
+            "magic": self.magic,
+            "second": block.second,
+        }
+        size, group = (items, high - low), (items, 1) if items <= self.group else None
+        launch = launch_numbers("backproject.cl", "backproject", **numbers)
+        tables = block.profiles.buffer, self.table, pulses.buffer, constants, centers, offsets
+        weights = block.weights or WEIGHT_BUFFERS * (self.table,)
+        self.device.run(
+            self.kernel, size, group, launch, *tables, image, on.missed, *weights, steps=pulses.n_used
+        )
 
 
 class _Lines:
-    """What both kernels by lines of pixels share: tiles on the device, and the records of their pulses."""
+    """Base class of the kernels by lines of pixels: tiles on the device, and the records of their pulses."""
 
-    def __init__(
-        self, device: Device, plan: LinePlan, tiling: LineTiling, *, bistatic: bool, wrap: bool, beam: bool,
-        weights: Mapping[str, int], **records: int,
-    ) -> None:  # fmt: skip
-        if weights["WEIGHT"]:
+    def __init__(self, device: Device, plan: LinePlan, tiling: LineTiling, form: KernelForm, **records: int) -> None:
+        if form.weights["WEIGHT"]:
             raise RuntimeError("lines of pixels share the weights of their pulses; please report this")
-        self.device, self.tiling, self.beam = device, tiling, beam
-        self.geometry = {"BISTATIC": int(bistatic), "BEAM": int(beam)}
-        self.macros = plan.macros(bistatic, wrap, bool(records["LOCAL"])) | self.geometry
+        self.device, self.tiling, self.beam = device, tiling, form.beam
+        geometry = {"BISTATIC": int(form.bistatic), "BEAM": int(form.beam)}
+        self.macros = plan.macros(form.bistatic, form.wrap, form.local) | geometry
         # LOCAL alone: the program of TileConstants, with the same macros
-        self.records = device.kernel("tile_constants.cl", "line_constants", **self.geometry, **records, RANGE=0)
-        self.wrap, self.fine = plan.length if wrap else 0, plan.fine
+        records |= {"LOCAL": int(form.local), "RANGE": 0}
+        self.records = device.kernel("tile_constants.cl", "line_constants", **geometry, **records)
+        self.wrap, self.fine = plan.length if form.wrap else 0, plan.fine
         assert tiling.grid.spacing is not None
         self.steps = dict(zip(("step_y", "step_x"), tiling.grid.spacing, strict=True))
         self.axes = device.upload(float_pairs.wide(steps(tiling.grid)))
@@ -108,56 +149,38 @@ class _Lines:
 
     def ready(self, tiles: Tiles, skip: int) -> TilesOnDevice:
         """Upload tiles; skip: SKIP_WINDOW and SKIP_BEAM of kernels/geometry.clh."""
-        return TilesOnDevice(
-            self.device, tiles, skip, [self.device.upload(float_pairs.wide(tiles.references.T))], self.beam
-        )
+        centers = self.device.upload(float_pairs.wide(tiles.references.T))
+        return TilesOnDevice(self.device, tiles, skip, [centers], self.beam)
 
-    def constants(self, on: TilesOnDevice, low: int, high: int, pulse: Any, n: int, floats: int) -> Any:
+    def constants(self, on: TilesOnDevice, low: int, high: int, pulses: Pulses, floats: int) -> Buffer:
         """Records (tiles, n, floats) of pulses at tiles low ... high - 1, on the device."""
-        out = self.device.empty(4 * floats * n * (high - low))
-        self.device.run(
-            self.records, (n // self.device.info.vector_width, high - low), None,
-            launch_numbers(
-                "tile_constants.cl", "line_constants", n=n, n_tiles=on.tiles.n_tiles, first=low, skip=on.skip,
-                wrap=self.wrap, fine=self.fine, radius=self.tiling.radius,
-            ),
-            pulse, on.buffers[0], self.axes, out,
-        )  # fmt: skip
-        return out
+        records = self.device.empty(4 * floats * pulses.n * (high - low))
+        numbers = {"n": pulses.n, "n_tiles": on.tiles.n_tiles, "first": low, "skip": on.skip}
+        numbers |= {"wrap": self.wrap, "fine": self.fine}
+        launch = launch_numbers("tile_constants.cl", "line_constants", **numbers, radius=self.tiling.radius)
+        size = (pulses.n // self.device.info.vector_width, high - low)
+        self.device.run(self.records, size, None, launch, pulses.buffer, on.buffers[0], self.axes, records)
+        return records
 
 
 class LineKernel(_Lines):
     """Backprojection of square tiles of a plane, line by line: kernels/backproject_lines.cl."""
 
-    def __init__(
-        self, device: Device, plan: LinePlan, tiling: LineTiling, *, bistatic: bool, wrap: bool, local: bool,
-        beam: bool, weights: Mapping[str, int] = NO_WEIGHTS,
-    ) -> None:  # fmt: skip
-        super().__init__(
-            device, plan, tiling, bistatic=bistatic, wrap=wrap, beam=beam, weights=weights, LOCAL=int(local)
-        )
-        self.components = line_plan.components(beam)
+    def __init__(self, device: Device, plan: LinePlan, tiling: LineTiling, form: KernelForm) -> None:
+        super().__init__(device, plan, tiling, form)
+        self.components = line_plan.components(form.beam)
         # the pulses of a group share one curvature, so blocks of rows are whole groups
         self.chunk = self.least_rows = plan.group
         self.kernel = device.kernel("backproject_lines.cl", "backproject_lines", **self.macros)
         self.table, self.weights = device.upload(plan.interpolator.table), device.upload(plan.line.table)
 
-    def add(
-        self, on: TilesOnDevice, low: int, high: int, pulses: Pulses, source: Any, stride: int, origin: int,
-        offset: int, image: Any, *weights: Any, second: int = 0,
-    ) -> None:  # fmt: skip
-        """Add a block of pulses to tiles low ... high - 1 of `image` (4, pixels); profiles begin at sample `offset`."""
-        (pulse, n, used), tiles = pulses, on.tiles
-        constants = self.constants(on, low, high, pulse, n, self.components)
-        self.device.run(
-            self.kernel, (high - low,), (1,),
-            launch_numbers(
-                "backproject_lines.cl", "backproject_lines", stride=stride, origin=origin, n=n, n_used=used, first=low,
-                n_tiles=tiles.n_tiles, pixels=tiles.n_tiles * tiles.per_tile, local_offset=offset, **self.steps,
-                **self.limits,
-            ),
-            source, self.table, self.weights, constants, image, on.missed, steps=used,
-        )  # fmt: skip
+    def add(self, on: TilesOnDevice, low: int, high: int, block: Block, image: Buffer) -> None:
+        """Add a block of pulses to tiles low ... high - 1 of `image` (4, pixels)."""
+        constants = self.constants(on, low, high, block.pulses, self.components)
+        numbers = on.numbers(low, block) | {"local_offset": block.profiles.offset, **self.steps, **self.limits}
+        launch = launch_numbers("backproject_lines.cl", "backproject_lines", **numbers)
+        buffers = block.profiles.buffer, self.table, self.weights, constants, image, on.missed
+        self.device.run(self.kernel, (high - low,), (1,), launch, *buffers, steps=block.pulses.n_used)
 
 
 class SharedLineKernel(_Lines):
@@ -165,54 +188,45 @@ class SharedLineKernel(_Lines):
 
     chunk = _shared_line_plan.CHUNK
 
-    def __init__(
-        self, device: Device, plan: SharedLinePlan, tiling: LineTiling, *, bistatic: bool, wrap: bool, local: bool,
-        beam: bool, weights: Mapping[str, int] = NO_WEIGHTS,
-    ) -> None:  # fmt: skip
-        super().__init__(
-            device, plan, tiling, bistatic=bistatic, wrap=wrap, beam=beam, weights=weights, LOCAL=int(local), SHARED=1
-        )
-        self.plan, self.least_rows, self.n_line = plan, plan.group, line_plan.components(beam) + 8
+    def __init__(self, device: Device, plan: SharedLinePlan, tiling: LineTiling, form: KernelForm) -> None:
+        super().__init__(device, plan, tiling, form, SHARED=1)
+        self.plan, self.least_rows, self.n_line = plan, plan.group, line_plan.components(form.beam) + 8
         self.components = self.n_line + ENTRY + 1  # and a pulse's share of its group's record
         self.schedule = device.kernel("schedule_pulses.cl", "schedule_pulses", **self.macros)
         self.kernel = device.kernel("backproject_shared_lines.cl", "backproject_shared_lines", **self.macros)
-        tables = (plan.interpolator, plan.line, plan.slopes or plan.line)
-        self.tables = [np.ravel(made.table) for made in tables]  # structs of the kernel's arguments
+        interpolators = (plan.interpolator, plan.line, plan.slopes or plan.line)
+        self.tables = [np.ravel(one.table) for one in interpolators]  # structs of the kernel's arguments
 
-    def add(
-        self, on: TilesOnDevice, low: int, high: int, pulses: Pulses, source: Any, stride: int, origin: int,
-        offset: int, image: Any, *weights: Any, second: int = 0,
-    ) -> None:  # fmt: skip
+    def add(self, on: TilesOnDevice, low: int, high: int, block: Block, image: Buffer) -> None:
         """Add a block of pulses to tiles low ... high - 1 of `image` (4, pixels)."""
-        device, (pulse, n, used), tiles = self.device, pulses, on.tiles
-        groups, items = -(-used // self.plan.group), self.plan.items
-        constants = self.constants(on, low, high, pulse, n, self.n_line)
+        device, pulses, items = self.device, block.pulses, self.plan.items
+        groups = -(-pulses.n_used // self.plan.group)
+        constants = self.constants(on, low, high, pulses, self.n_line)
         schedule = device.empty(4 * (4 + ENTRY * self.plan.group) * groups * (high - low))
-        device.run(
-            self.schedule, (groups, high - low), None,
-            launch_numbers(
-                "schedule_pulses.cl", "schedule_pulses", n=n, n_used=used, **self.steps, **self.limits,
-            ),
-            constants, schedule,
-        )  # fmt: skip
-        device.run(
-            self.kernel, (items, high - low), (items, 1),
-            launch_numbers(
-                "backproject_shared_lines.cl", "backproject_shared_lines", stride=stride, origin=origin, n=n,
-                n_used=used, first=low, n_tiles=tiles.n_tiles, pixels=tiles.n_tiles * tiles.per_tile, **self.steps,
-            ),
-            *self.tables, source, constants, schedule, image, on.missed, steps=used,
-        )  # fmt: skip
+        numbers = {"n": pulses.n, "n_used": pulses.n_used, **self.steps, **self.limits}
+        launch = launch_numbers("schedule_pulses.cl", "schedule_pulses", **numbers)
+        device.run(self.schedule, (groups, high - low), None, launch, constants, schedule)
+        numbers = on.numbers(low, block) | self.steps
+        launch = launch_numbers("backproject_shared_lines.cl", "backproject_shared_lines", **numbers)
+        buffers = *self.tables, block.profiles.buffer, constants, schedule, image, on.missed
+        device.run(self.kernel, (items, high - low), (items, 1), launch, *buffers, steps=pulses.n_used)
 
 
 class TilesOnDevice:
     """Tiles on the device, with the buffers of a kernel, and two counts per tile: the pulses whose range window misses
     the tile, and those whose beam does."""
 
-    def __init__(self, device: Device, tiles: Tiles, skip: int, buffers: list[Any], beam: bool) -> None:
+    def __init__(self, device: Device, tiles: Tiles, skip: int, buffers: list[Buffer], beam: bool) -> None:
         self.device, self.tiles, self.skip, self.buffers, self.beam = device, tiles, int(skip), buffers, beam
         self.counts = 1 + beam
         self.missed = device.zeros(4 * self.counts * tiles.n_tiles)
+
+    def numbers(self, low: int, block: Block) -> dict[str, float]:
+        """Numbers that all kernels need to add a block of pulses to tiles from `low` on."""
+        (_, n, n_used), profiles, tiles = block.pulses, block.profiles, self.tiles
+        pixels = tiles.n_tiles * tiles.per_tile
+        numbers: dict[str, float] = {"stride": profiles.stride, "origin": profiles.origin, "n": n, "n_used": n_used}
+        return numbers | {"first": low, "n_tiles": tiles.n_tiles, "pixels": pixels}
 
     def skipped(self) -> np.ndarray:
         """Numbers of pulses left out of every tile, (2, n_tiles) int64: by their range window, and by their beam."""
@@ -221,12 +235,12 @@ class TilesOnDevice:
 
 
 def kernel_of(
-    device: Device, plan: Plan | LinePlan, tiling: Tiling, **how: Any
+    device: Device, plan: Plan | LinePlan, tiling: Tiling, form: KernelForm
 ) -> GatherKernel | LineKernel | SharedLineKernel:
-    """The kernel for a plan; how: bistatic, wrap, local, beam, weights."""
+    """The kernel for a plan."""
     if isinstance(plan, LinePlan):
         assert isinstance(tiling, LineTiling)
         if isinstance(plan, SharedLinePlan):
-            return SharedLineKernel(device, plan, tiling, **how)
-        return LineKernel(device, plan, tiling, **how)
-    return GatherKernel(device, plan, tiling, **how)
+            return SharedLineKernel(device, plan, tiling, form)
+        return LineKernel(device, plan, tiling, form)
+    return GatherKernel(device, plan, tiling, form)

@@ -70,7 +70,7 @@ class MemoryPlan:
         return self.n_bytes(roots, pixels) + self.profiles.nbytes(rows) + 2 * min(AT_ONCE, nbytes / 8)
 
     def passes(self, nbytes: float) -> tuple[int, int]:
-        """How many parts all blocks have, and how many roots these parts have together."""
+        """Number of parts of all blocks, and of the roots of these parts together."""
         parts = [part for run in self.blocks(nbytes) for part in self.parts(*run, nbytes)]
         return len(parts), sum(self.tiling.part_size(part, self.plan.factors[0])[0] for part in parts)
 
@@ -107,8 +107,8 @@ class MemoryPlan:
         def most(bands: int) -> int:
             return self.most(nbytes, bands)
 
-        whole = self._fits(first, last, nbytes)
-        return self.tiling.parts((first, last), self.plan.factors[0], most, whole)
+        do_all_fit = self._fits(first, last, nbytes)
+        return self.tiling.parts((first, last), self.plan.factors[0], most, do_all_fit)
 
     def at_once(self, tree: Tree, budget: float) -> tuple[int, float, float]:
         """Division of the levels below the first: number of roots at a time; bytes per level at a time within one root,
@@ -116,9 +116,9 @@ class MemoryPlan:
         """
         each, profiles = 0.0, 0.0
         for i in range(1, len(tree.centers)):
-            made = len(tree.centers[i]) / len(tree.centers[0])
-            profiles += made * self.plan.levels[i].n_bytes(self.strides[i])
-            each += made * self.tile_bytes(i)
+            tiles_per_root = len(tree.centers[i]) / len(tree.centers[0])
+            profiles += tiles_per_root * self.plan.levels[i].n_bytes(self.strides[i])
+            each += tiles_per_root * self.tile_bytes(i)
         each += tree.leaves.n_tiles / len(tree.centers[0]) * self.constants
         most = min((AT_ONCE if self.is_cpu else budget / 8) / max(profiles, 1.0), budget / 8 / each)
         return max(1, int(most)), np.inf if each <= budget / 8 else budget / 8 / len(tree.centers), each

@@ -60,16 +60,16 @@ def decimated(track: PulseGeometry, ratio: int, taps: int, oversample: float) ->
     for begin, end in track.runs:
         n = end - begin
         n_blocks = -(-n // ratio)
-        at = np.arange(n_blocks + taps - 1) - (taps // 2 - 1)
+        numbers = np.arange(n_blocks + taps - 1) - (taps // 2 - 1)
         b = np.arange(n_blocks)
         blocks.append(np.stack([begin + b * ratio, np.minimum(ratio, n - b * ratio), first + b, 0 * b], axis=1))
-        places = at * ratio
+        places = numbers * ratio
         parts.append(_positions(track.tx[begin:end], places))
         if not track.is_monostatic:
             rx_parts.append(_positions(track.rx[begin:end], places))
-        rows += [begin] * len(at)
-        runs.append((first, first + len(at)))
-        first += len(at)
+        rows += [begin] * len(numbers)
+        runs.append((first, first + len(numbers)))
+        first += len(numbers)
     z = np.arange(ratio) / ratio - 0.5
     weights = interpolation.least_squares_weights(taps, oversample, z)
     tx = np.concatenate(parts)
@@ -150,8 +150,8 @@ def filter_error(
     for center in centers:
         points = center + radius * directions
         exact = _phases(track, pulses, points, center, frequency)
-        known = _phases(made.kept, kept, points, center, frequency)
-        worst = max(worst, float(np.abs(np.einsum("pn,pnm->pm", filters, known) - exact).max()))
+        phases = _phases(made.kept, kept, points, center, frequency)
+        worst = max(worst, float(np.abs(np.einsum("pn,pnm->pm", filters, phases) - exact).max()))
     return worst
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -16,7 +15,7 @@ MORE = 1.5  # rows added directly to a root, relative to those it needs: neighbo
 
 @dataclass(frozen=True, eq=False)
 class TileCoverage:
-    """What becomes of the pairs of rows and roots (the largest tiles).
+    """Rows by what becomes of them at each root (the largest tiles).
 
     merged    (n roots,) bool: roots into which rows are merged
     left_out  for each root: the rows that are not merged, bool (n_rows,), or None where all are
@@ -33,11 +32,10 @@ class TileCoverage:
         """The coverage of these roots: the same rows are added directly, whichever neighbours are made with them."""
         place = np.full(len(self.merged), -1)
         place[roots] = np.arange(len(roots))
-        directly = [(mine[mine >= 0], rows) for mine, rows in ((place[r], rows) for r, rows in self.directly)]
-        return TileCoverage(
-            self.merged[roots], [self.left_out[i] for i in roots], [d for d in directly if len(d[0])],
-            self.missed[:, roots],
-        )  # fmt: skip
+        directly = [(places[places >= 0], rows) for places, rows in ((place[r], rows) for r, rows in self.directly)]
+        directly = [(places, rows) for places, rows in directly if len(places)]
+        left_out = [self.left_out[i] for i in roots]
+        return TileCoverage(self.merged[roots], left_out, directly, self.missed[:, roots])
 
 
 def coverage_of(a: PulseGeometry, roots: Roots, center: np.ndarray, radius: float, least: float) -> TileCoverage:
@@ -49,7 +47,7 @@ def coverage_of(a: PulseGeometry, roots: Roots, center: np.ndarray, radius: floa
     """
     n = len(roots.centers)
     merged = np.ones(n, bool)
-    left_out: list[Any] = [None] * n
+    left_out: list[np.ndarray | None] = [None] * n
     missed = np.zeros((2, n), np.int64)
     if a.wrap and a.beam is None:
         return TileCoverage(merged, left_out, [], missed)
@@ -59,22 +57,22 @@ def coverage_of(a: PulseGeometry, roots: Roots, center: np.ndarray, radius: floa
     all_rows = []
     for i, place in enumerate(roots.centers + center):
         depth = a.depth(place)
-        outside, whole = depth < -reach, depth >= reach
+        outside, is_inside = depth < -reach, depth >= reach
         outside_beam = np.zeros_like(outside)
         if a.beam is not None:
             depth = a.beam_depth(place)
             outside_beam = ~outside & (depth < -reach)
-            whole &= depth >= reach
-        if whole.all():
+            is_inside &= depth >= reach
+        if is_inside.all():
             continue
-        some = ~(whole | outside | outside_beam)
-        if some.any() and whole.sum() < least:
+        is_partly_inside = ~(is_inside | outside | outside_beam)
+        if is_partly_inside.any() and is_inside.sum() < least:
             merged[i] = False
             all_rows.append(i)
             continue
-        merged[i], left_out[i], reasons[i] = whole.any(), ~whole, np.stack([outside, outside_beam])
-        if some.any():
-            partly[i] = some
+        merged[i], left_out[i], reasons[i] = is_inside.any(), ~is_inside, np.stack([outside, outside_beam])
+        if is_partly_inside.any():
+            partly[i] = is_partly_inside
     directly: list[tuple[np.ndarray, np.ndarray | None]] = []
     if all_rows:
         directly.append((np.array(all_rows), None))
@@ -129,7 +127,7 @@ def without(cut: np.ndarray, left_out: np.ndarray) -> np.ndarray:
     parts = [cut[:0]]
     for first, count, kept, row in cut:
         begin, end = np.maximum(begins, first), np.minimum(ends, first + count)
-        some = end > begin
-        begin, end = begin[some], end[some]
+        has_rows = end > begin
+        begin, end = begin[has_rows], end[has_rows]
         parts.append(np.stack([begin, end - begin, np.full(len(begin), kept), row + begin - first], axis=1))
     return np.concatenate(parts)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,14 +20,17 @@ from ...base.stage_timer import Clock
 from ...opencl.device import Device
 from ...opencl.launch_numbers import launch_numbers
 from ..direct.direct import Direct
-from ..direct.tile_kernels import TilesOnDevice, kernel_of
+from ..direct.tile_kernels import Block, KernelForm, Profiles, Pulses, TilesOnDevice, kernel_of
 from ..engine import Engine, RowProfiles, Skipped
 from ..focusing_task import FocusingTask
-from ..tiling.tiling import Roots, Tiling
+from ..tiling.tiling import FlatImage, Roots, Tiling
 from ..tiling.tree import Tree
 from ._memory import MemoryPlan
 from ._tile_coverage import TileCoverage, coverage_of, same_coverage, without
 from .plan import GUARD, FactorPlan, Level, moving_cost
+
+if TYPE_CHECKING:
+    from ...opencl.device import Buffer
 
 MERGE = "merge_subapertures.cl"
 SPAN = 32  # vectors of a profile per work-item on CPUs; 1 on GPUs, where neighbouring work-items then read one line
@@ -38,10 +41,25 @@ class _Descent:
     """A tree of tiles on the device: sums of pixels, and for each level the centres of the tiles and their parents."""
 
     tree: Tree
-    image: Any
-    centers: list[Any]
-    parents: list[Any]
+    image: Buffer
+    centers: list[Buffer]
+    parents: list[Buffer | None]
     ready: TilesOnDevice
+
+
+@dataclass(frozen=True, eq=False)
+class _Tiles:
+    """Tiles first ... first + count - 1 of a level that pulses are merged into.
+
+    parents  numbers of the tiles above;  blocks  of pulses, between the same kept pulses, and n_blocks, their number
+    """
+
+    level: int
+    first: int
+    count: int
+    parents: Buffer
+    blocks: Buffer
+    n_blocks: int
 
 
 class Factorized(Engine):
@@ -51,7 +69,7 @@ class Factorized(Engine):
 
     def __init__(self, device: Device, task: FocusingTask, plan: FactorPlan, tiling: Tiling) -> None:
         self.device, self.plan, self.tiling = device, plan, tiling
-        self.whole = self.task = task
+        self.every_row = self.task = task
         if (plan.order != np.arange(len(plan.order))).any():
             raw, antennas, order = task.raw[plan.order], task.antennas, plan.order
             self.task = replace(task, raw=raw, row_weight=task.row_weight[order], antennas=antennas.picked(order))
@@ -63,24 +81,19 @@ class Factorized(Engine):
         bistatic = not task.antennas.is_monostatic
         self.merges = []
         for i, level in enumerate(plan.levels):
-            made = plan.between if i else plan.first
+            interpolator = plan.between if i else plan.first
             macros = {
                 "BISTATIC": int(bistatic),
                 "SPAN": self._span,
                 "WRAP": plan.length if task.wrap and not i else 0,
-                "TAPS": made.taps,
-                "TERMS": made.terms,
+                "TAPS": interpolator.taps,
+                "TERMS": interpolator.terms,
                 "FROM_CENTRE": int(i == 0),
                 "FILTER_TAPS": level.decimation.filter.shape[1],
             }
-            self.merges.append(
-                (
-                    device.kernel(MERGE, "shifts", **macros),
-                    device.kernel(MERGE, "merge", **macros),
-                )
-            )
-        self.leaves = kernel_of(device, plan.leaf, tiling, bistatic=bistatic, wrap=False, local=True, beam=False)
-        self.tables = [device.upload(made.table) for made in (plan.first, plan.between)]
+            self.merges.append([device.kernel(MERGE, name, **macros) for name in ("shifts", "merge")])
+        self.leaves = kernel_of(device, plan.leaf, tiling, KernelForm(bistatic, wrap=False, local=True, beam=False))
+        self.tables = [device.upload(interpolator.table) for interpolator in (plan.first, plan.between)]
         self.filters = [device.upload(v.decimation.filter) for v in plan.levels]
         self.blocks_of = [device.upload(v.decimation.blocks) for v in plan.levels]
         # kept pulses of each level in the layout of the kernels, about the scene's centre
@@ -88,7 +101,7 @@ class Factorized(Engine):
         for v in plan.levels:
             antennas = v.decimation.kept
             packed = antennas.packed(tiling.center, plan.length, 0, len(antennas), self.lanes)
-            self.kept.append((device.upload(packed), packed.shape[2], len(antennas)))
+            self.kept.append(Pulses(device.upload(packed), packed.shape[2], len(antennas)))
         self.strides = [self._stride(v) for v in plan.levels]
         # a root inside the range window still needs guard samples beyond the window for interpolation
         root = plan.levels[0]
@@ -97,14 +110,21 @@ class Factorized(Engine):
         self.profiles = RowProfiles(device, self.task, plan.first, plan.length, pad)
         self.least_pixels = 1000.0 * plan.length
         self.memory = MemoryPlan(
-            plan, tiling, task.raw.n_rows, self.strides, self.profiles, self.kept[-1][1],
-            self.leaves.components, device.info.max_alloc, device.is_cpu,
-        )  # fmt: skip
+            plan=plan,
+            tiling=tiling,
+            n_rows=task.raw.n_rows,
+            strides=self.strides,
+            profiles=self.profiles,
+            last_kept=self.kept[-1].n,
+            components=self.leaves.components,
+            max_alloc=device.info.max_alloc,
+            is_cpu=device.is_cpu,
+        )
 
     def _stride(self, level: Level) -> int:
         """Complex samples of a profile of this level, rounded up to whole vectors."""
-        whole = max(self.lanes // 2, 1)
-        return -(-(2 * level.reach + 1) // whole) * whole
+        pair_lanes = max(self.lanes // 2, 1)
+        return -(-(2 * level.reach + 1) // pair_lanes) * pair_lanes
 
     def blocks(self, nbytes: float) -> list[tuple[int, int]]:
         """Runs of bands to be made with nbytes on the device; see `MemoryPlan.blocks`."""
@@ -115,15 +135,15 @@ class Factorized(Engine):
         root = self.plan.levels[0]
         moved = moving_cost(2 * root.reach, self.plan.first.taps, root.decimation.filter.shape[1])
         passes, roots = self.memory.passes(nbytes)
-        whole = self.tiling.n_roots(0, self.tiling.n_bands, self.plan.factors[0])
-        return (passes - 1) * self.profiles.cost + max(roots - whole, 0) * self.task.raw.n_rows * moved
+        uncut_roots = self.tiling.n_roots(0, self.tiling.n_bands, self.plan.factors[0])
+        return (passes - 1) * self.profiles.cost + max(roots - uncut_roots, 0) * self.task.raw.n_rows * moved
 
     def working(self, nbytes: float) -> float:
         """See engine.Engine."""
         return min(self.memory.working(nbytes), nbytes)
 
     def fill(
-        self, first: int, last: int, flat: Any, budget: float, clock: Clock, on_progress: Callable[[float], None]
+        self, first: int, last: int, flat: FlatImage, budget: float, clock: Clock, on_progress: Callable[[float], None]
     ) -> Skipped:
         """Focus bands first ... last - 1 into `flat`; see engine.Engine."""
         tiling, n_rows = self.tiling, self.task.raw.n_rows
@@ -147,13 +167,14 @@ class Factorized(Engine):
 
     def _sums(
         self, tree: Tree, coverage: TileCoverage, budget: float, clock: Clock, on_progress: Callable[[float], None]
-    ) -> tuple[Any, np.ndarray]:
+    ) -> tuple[Buffer, np.ndarray]:
         """Sums of the leaves' pixels (4, pixels), on the device, and rows left out of each (2, n leaves)."""
         device, leaves, n_rows = self.device, tree.leaves, self.task.raw.n_rows
         image = device.zeros(16 * leaves.n_tiles * self.tiling.per_tile)
-        down = _Descent(tree, image, [device.upload(float_pairs.wide(c.T)) for c in tree.centers],
-                        [None, *(device.upload(p) for p in tree.parents)], self.leaves.ready(leaves, 0))  # fmt: skip
-        count = np.array([[reason in self.whole.skips] for reason in ("range window", "beam")])
+        centers = [device.upload(float_pairs.wide(c.T)) for c in tree.centers]
+        parents = [None, *(device.upload(p) for p in tree.parents)]
+        down = _Descent(tree, image, centers, parents, self.leaves.ready(leaves, 0))
+        count = np.array([[reason in self.every_row.skips] for reason in ("range window", "beam")])
         n_roots = len(tree.centers[0])
         each = [b - a for a, b in map(tree.leaves_of, range(n_roots))]
         missed = np.repeat(coverage.missed, each, axis=1) * count
@@ -165,12 +186,12 @@ class Factorized(Engine):
         step, within, below = self.memory.at_once(tree, budget)
         edges = np.flatnonzero(np.diff(np.concatenate([[False], coverage.merged, [False]])))
         for low, high in edges.reshape(-1, 2).tolist():
-            gathered = device.zeros(8 * (high - low) * self.kept[0][2] * self.strides[0])
+            gathered = device.zeros(8 * (high - low) * self.kept[0].n_used * self.strides[0])
 
             def rows_done(rows: float, low: int = low, high: int = high) -> None:
                 on_progress((low * n_rows + (high - low) * rows / 2) / n_roots)
 
-            self._gather(down, low, high, coverage.left_out, gathered, budget, clock, rows_done)
+            self._gather(down, (low, high), coverage.left_out, gathered, budget, clock, rows_done)
             queued = 0.0
             for root in range(low, high, step):
                 self._descend(down, 0, root, min(root + step, high), gathered, low, within)
@@ -197,53 +218,54 @@ class Factorized(Engine):
 
         Returns the leaves, and the rows skipped in each (2, n).
         """
-        tree, task = down.tree, self.whole
+        tree, task = down.tree, self.every_row
         if rows is not None:
             raw, antennas, weight = self.task.raw[rows], self.antennas.picked(rows), self.task.row_weight[rows]
             task = replace(self.task, raw=raw, antennas=antennas, row_weight=weight)
         picked = np.concatenate([np.arange(*tree.leaves_of(root)) for root in roots])
         engine = Direct(self.device, task, self.plan.edge, self.tiling)
-        some = tree.leaves.picked(picked)
-        image, missed = engine.add_up(some, budget, clock, lambda rows: None)
-        copy = self.device.kernel("assemble_image.cl", "move")
-        where = self.device.upload(picked.astype(np.int32))
-        per_tile = self.tiling.per_tile
-        self.device.run(
-            copy, (per_tile, len(picked)), None,
-            image, np.uint64(len(picked) * per_tile), where, down.image, np.uint64(tree.leaves.n_tiles * per_tile),
-        )  # fmt: skip
+        image, missed = engine.add_up(tree.leaves.picked(picked), budget, clock, lambda rows: None)
+        move = self.device.kernel("assemble_image.cl", "move")
+        numbers, per_tile = self.device.upload(picked.astype(np.int32)), self.tiling.per_tile
+        n_picked, n_pixels = np.uint64(len(picked) * per_tile), np.uint64(tree.leaves.n_tiles * per_tile)
+        self.device.run(move, (per_tile, len(picked)), None, image, n_picked, numbers, down.image, n_pixels)
         self.device.finish()
         return picked, missed
 
     def _gather(
-        self, down: _Descent, low: int, high: int, left_out: list[np.ndarray | None], out: Any, budget: float,
-        clock: Clock, on_progress: Callable[[float], None],
-    ) -> None:  # fmt: skip
-        """First level: add the profiles of all pulses to the kept pulses of roots low ... high - 1.
+        self,
+        down: _Descent,
+        roots: tuple[int, int],
+        left_out: list[np.ndarray | None],
+        gathered: Buffer,
+        budget: float,
+        clock: Clock,
+        on_progress: Callable[[float], None],
+    ) -> None:
+        """First level: add the profiles of all pulses to the kept pulses of roots (first, last + 1).
 
         left_out  for each root: rows that are not merged into it (n_rows,) bool, or None
         """
-        device, plan, task = self.device, self.plan, self.task
+        device, plan, task, (low, high) = self.device, self.plan, self.task, roots
         level, raw = plan.levels[0], task.raw
-        stride = self.profiles.stride
-        shifts, merge = self.merges[0]
-        roots, centers = len(down.tree.centers[0]), down.centers[0]
-        nowhere = device.upload(np.zeros(roots, np.int32))
+        nowhere = device.upload(np.zeros(len(down.tree.centers[0]), np.int32))
         blocks, n_shift = level.decimation.blocks, 2 + 2 * plan.first.taps
         rows = self.memory.rows(budget)
         with self.profiles.pipeline as pipeline:
             for start in range(0, raw.n_rows, rows):
                 stop = min(start + rows, raw.n_rows)
                 pipeline.new_block()
-                source = self.profiles.upload(start, stop)
+                stride = self.profiles.stride
+                profiles = Profiles(self.profiles.upload(start, stop), stride, stride // 2)
                 packed = task.antennas.packed(self.tiling.center, plan.length, start, stop, self.lanes)
-                pulse, n, used = pipeline.upload(packed), packed.shape[2], stop - start
+                pulses = Pulses(pipeline.upload(packed), packed.shape[2], stop - start)
                 clock.lap("profiles")
                 # blocks of pulses between the same kept pulses, cut at the ends of this block of rows
                 begin, end = np.maximum(blocks[:, 0], start), np.minimum(blocks[:, 0] + blocks[:, 1], stop)
                 cut = np.stack([begin - start, end - begin, blocks[:, 2], begin - blocks[:, 0]], axis=1)[end > begin]
-                step = max(1, int(min(budget / 8 / pipeline.held, device.info.max_alloc) / (4 * n_shift * used)))
-                records = device.empty(4 * n_shift * used * min(step, high - low))
+                record_bytes = 4 * n_shift * pulses.n_used
+                step = max(1, int(min(budget / 8 / pipeline.held, device.info.max_alloc) / record_bytes))
+                records = device.empty(record_bytes * min(step, high - low))
                 in_use = []  # on a CPU a buffer is memory of the host: it must exist until the kernel has read it
                 for tile, count, without_rows in same_coverage(left_out, low, high, step):
                     seen = cut if without_rows is None else without(cut, without_rows[start:stop])
@@ -251,76 +273,83 @@ class Factorized(Engine):
                         continue
                     cut_buffer = device.upload(seen.astype(np.int32))
                     in_use.append(cut_buffer)
-                    device.run(
-                        shifts, (n // self.lanes, count), None,
-                        launch_numbers(
-                            MERGE, "shifts", n_parents=roots, n=n, n_used=used, n_tiles=roots, first=tile,
-                            reach=level.reach, samples=self.strides[0], stride=stride, origin=stride // 2,
-                        ),
-                        pulse, centers, centers, nowhere, self.tables[0], records,
-                    )  # fmt: skip
-                    device.run(
-                        merge, (self._spans(0), count), None,
-                        launch_numbers(
-                            MERGE, "merge", stride=stride, origin=stride // 2, first_parent=0, n_used=used,
-                            n_blocks=len(seen), reach=level.reach, first=tile, out_first=low, n_kept=self.kept[0][2],
-                            out_stride=self.strides[0],
-                        ),
-                        source, nowhere, records, cut_buffer, self.filters[0], out, steps=used,
-                    )  # fmt: skip
+                    tiles = _Tiles(0, tile, count, nowhere, cut_buffer, len(seen))
+                    self._shift(down, tiles, pulses, profiles, records)
+                    self._merge(tiles, pulses, profiles, records, gathered, first_parent=0, first_out=low)
                 pipeline.step(partial(on_progress, stop))
                 clock.lap("backproject")
         clock.lap("backproject")
 
+    def _shift(self, down: _Descent, tiles: _Tiles, pulses: Pulses, profiles: Profiles, records: Buffer) -> None:
+        """Make the records by which `_merge` moves the profiles of the level above to tiles."""
+        level, centers, above = tiles.level, down.centers, max(tiles.level - 1, 0)
+        numbers = {"n_parents": len(down.tree.centers[above]), "n": pulses.n, "n_used": pulses.n_used}
+        numbers |= {"n_tiles": len(down.tree.centers[level]), "first": tiles.first}
+        numbers |= {"reach": self.plan.levels[level].reach, "samples": self.strides[level]}
+        launch = launch_numbers(MERGE, "shifts", **numbers, stride=profiles.stride, origin=profiles.origin)
+        tables, size = self.tables[min(level, 1)], (pulses.n // self.lanes, tiles.count)
+        buffers = pulses.buffer, centers[above], centers[level], tiles.parents, tables, records
+        self.device.run(self.merges[level][0], size, None, launch, *buffers)
+
+    def _merge(
+        self,
+        tiles: _Tiles,
+        pulses: Pulses,
+        profiles: Profiles,
+        records: Buffer,
+        merged: Buffer,
+        *,
+        first_parent: int,
+        first_out: int,
+    ) -> None:
+        """Add the profiles of the level above to the kept pulses of tiles, in a buffer that begins with `first_out`.
+
+        first_parent  the tile of the level above whose profiles come first
+        """
+        level = tiles.level
+        numbers = {"stride": profiles.stride, "origin": profiles.origin, "first_parent": first_parent}
+        numbers |= {"n_used": pulses.n_used, "n_blocks": tiles.n_blocks, "reach": self.plan.levels[level].reach}
+        numbers |= {"first": tiles.first, "out_first": first_out, "n_kept": self.kept[level].n_used}
+        launch = launch_numbers(MERGE, "merge", **numbers, out_stride=self.strides[level])
+        size = (self._spans(level), tiles.count)
+        buffers = profiles.buffer, tiles.parents, records, tiles.blocks, self.filters[level], merged
+        self.device.run(self.merges[level][1], size, None, launch, *buffers, steps=pulses.n_used)
+
     def _spans(self, level: int) -> int:
         return -(-2 * self.strides[level] // (self._span * (8 if self.lanes > 1 else 2)))
 
-    def _descend(self, down: _Descent, level: int, low: int, high: int, source: Any, first: int, within: float) -> None:
+    def _descend(
+        self, down: _Descent, level: int, low: int, high: int, source: Buffer, first: int, within: float
+    ) -> None:
         """From the profiles of tiles low ... high - 1 of a level to their pixels, through all levels below.
 
         source, first  profiles of the level, of which the first is that of tile `first`
 
         within  bytes per level below at a time
         """
-        device, plan, tree = self.device, self.plan, down.tree
-        pulse, n, used = self.kept[level]
+        device, plan, tree, pulses = self.device, self.plan, down.tree, self.kept[level]
+        stride, origin = self.strides[level], plan.levels[level].reach
         if level == len(plan.levels) - 1:
-            stride = self.strides[level]
             for begin, end in _runs(low, high, within / self.memory.constants):
-                self.leaves.add(
-                    down.ready, begin, end, self.kept[level], source, stride, plan.levels[level].reach,
-                    (begin - first) * used * stride, down.image,
-                )  # fmt: skip
+                profiles = Profiles(source, stride, origin, (begin - first) * pulses.n_used * stride)
+                self.leaves.add(down.ready, begin, end, Block(pulses, profiles), down.image)
                 if end < high:
                     device.finish()
             return
-        shifts, merge = self.merges[level + 1]
-        below, parents = plan.levels[level + 1], down.parents[level + 1]
-        n_kept, stride = self.kept[level + 1][2], self.strides[level + 1]
-        above = {"stride": self.strides[level], "origin": plan.levels[level].reach}  # of the profiles read
+        below, parents = level + 1, down.parents[level + 1]
+        assert parents is not None
         children = tree.children[level]
-        whole = int(children[low]), int(children[high])
-        for begin, end in _runs(*whole, within / self.memory.tile_bytes(level + 1)):
-            made = device.zeros(8 * (end - begin) * n_kept * stride)
-            records = device.empty(4 * (2 + 2 * plan.between.taps) * used * (end - begin))
-            device.run(
-                shifts, (n // self.lanes, end - begin), None,
-                launch_numbers(
-                    MERGE, "shifts", n_parents=len(tree.centers[level]), n=n, n_used=used,
-                    n_tiles=len(tree.centers[level + 1]), first=begin, reach=below.reach, samples=stride, **above,
-                ),
-                pulse, down.centers[level], down.centers[level + 1], parents, self.tables[1], records,
-            )  # fmt: skip
-            device.run(
-                merge, (self._spans(level + 1), end - begin), None,
-                launch_numbers(
-                    MERGE, "merge", first_parent=first, n_used=used, n_blocks=len(below.decimation.blocks),
-                    reach=below.reach, first=begin, out_first=begin, n_kept=n_kept, out_stride=stride, **above,
-                ),
-                source, parents, records, self.blocks_of[level + 1], self.filters[level + 1], made, steps=used,
-            )  # fmt: skip
-            self._descend(down, level + 1, begin, end, made, begin, within)
-            if (begin, end) != whole:
+        every = int(children[low]), int(children[high])
+        for begin, end in _runs(*every, within / self.memory.tile_bytes(below)):
+            merged = device.zeros(8 * (end - begin) * self.kept[below].n_used * self.strides[below])
+            records = device.empty(4 * (2 + 2 * plan.between.taps) * pulses.n_used * (end - begin))
+            n_blocks = len(plan.levels[below].decimation.blocks)
+            tiles = _Tiles(below, begin, end - begin, parents, self.blocks_of[below], n_blocks)
+            profiles = Profiles(source, stride, origin)
+            self._shift(down, tiles, pulses, profiles, records)
+            self._merge(tiles, pulses, profiles, records, merged, first_parent=first, first_out=begin)
+            self._descend(down, below, begin, end, merged, begin, within)
+            if (begin, end) != every:
                 device.finish()
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -29,6 +29,9 @@ from ._subapertures import Decimation, chains, decimated, filter_error, rate, ru
 SPACINGS = (1.5, 1.75, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0)  # profile samples per 1/bandwidth
 TAPS = (4, 6, 8)  # taps of the interpolators along range and along the track
 TRIES = 8  # candidates whose errors are computed in full
+MERGING_SHARE = 0.75  # share of the tolerance for merging; the rest is for the step from leaves to pixels
+SHARE_SLACK = 1.3  # ratio of a filter's error to its share, at most: other errors are often below theirs
+SMALLER_RATIO = 0.75  # factor on a decimation ratio whose error is too large
 MOST_MERGED = 4096  # pulses between two kept pulses at most: more would not reduce the cost
 GUARD, LEAF_GUARD = 14, 8  # samples beyond a tile that interpolation and whole vectors may read
 
@@ -55,7 +58,7 @@ class Level:
 
 @dataclass(frozen=True, eq=False)
 class FactorPlan:
-    """How the factorised method makes an image: the levels from roots to leaves, and the step from leaves to pixels.
+    """Plan of an image by the factorised method: the levels from roots to leaves, and the step from leaves to pixels.
 
     factors  leaves along a side of a tile, for each level
     first    interpolator of the range profiles of the rows, `length` samples long; between: that between two levels
@@ -76,7 +79,7 @@ class FactorPlan:
     cost: float
     order: np.ndarray
 
-    def describe(self, method: str) -> dict[str, Any]:
+    def describe(self, method: str) -> dict[str, object]:
         """The plan in words and numbers, for a report."""
         return {
             "method": method,
@@ -103,20 +106,40 @@ def make_plan(task: FocusingTask, tolerance: float, on: DeviceClass = CPU) -> tu
     # near an antenna, lines are curved too much
     for lines in (True, False) if line_plan.possible(task.grid, on) else (False,):
         case = _Case(task, track, order, tolerance, lines)
-        tried = sorted(case.candidates(), key=lambda c: c[0])[:TRIES]
-        for _, choice in tried:
-            made = case.build(*choice)
-            if not isinstance(made, str):
-                return made
-            reason = made
+        tried = sorted(case.candidates(), key=lambda candidate: candidate.cost)[:TRIES]
+        for candidate in tried:
+            plan = case.build(candidate)
+            if not isinstance(plan, str):
+                return plan
+            reason = plan
         if not tried and not reason:
-            reason = case.untried()
+            reason = case.obstacle()
     raise ToleranceUnreachable(tolerance, None, reason, how=f"with sub-apertures here: {reason}")
 
 
 def _spacing(taps: int, error: float) -> float | None:
     """The widest spacing at which the error of so many taps is at most `error`; None: none."""
     return next((s for s in SPACINGS if interpolation.line_interpolator(taps, s).error <= error), None)
+
+
+class _Candidate(NamedTuple):
+    """A tree of tiles to be planned.
+
+    chain          sides of the tiles, from roots to leaves, pixels
+    taps, spacing  of the interpolators along range, and samples per 1/bandwidth
+    filter_taps, fine  of the filters over the pulses, and kept pulses per Nyquist interval
+    share          of the tolerance, for each of the errors
+    cost, ratios   estimated, in contributions; decimation ratio of each level
+    """
+
+    chain: tuple[int, ...]
+    taps: int
+    spacing: float
+    filter_taps: int
+    fine: float
+    share: float
+    cost: float
+    ratios: list[int]
 
 
 class _Case:
@@ -127,7 +150,7 @@ class _Case:
     ) -> None:
         grid = task.grid
         self.task, self.track, self.order, self.tolerance, self.lines = task, track, order, tolerance, lines
-        self.highest, self.bandwidth = task.highest, float(task.raw.bandwidth.max())
+        self.highest, self.bandwidth = task.highest, task.bandwidth
         self.distance = task.antennas.distance(grid.bounds)
         tiling = tiling_of(grid, 16)
         self.axes, self.points, self.largest = tiling.axes, tiling.outline(), tiling.longest_side
@@ -136,22 +159,22 @@ class _Case:
             rate(track, self.points, self.axes) * 2 * self.highest / SPEED_OF_LIGHT
         )  # cycles per row and metre
 
-    def candidates(self) -> Iterator[tuple[float, tuple[Any, ...]]]:
-        """Estimated cost, and arguments of `build`, of every candidate."""
+    def candidates(self) -> Iterator[_Candidate]:
+        """All candidates, with their estimated costs."""
         for leaf in self.leaves:
             for chain in chains(leaf, self.largest):
-                share = 0.75 * self.tolerance / (2 * len(chain) + 1)
+                share = MERGING_SHARE * self.tolerance / (2 * len(chain) + 1)
                 for taps, filter_taps in ((t, n) for t in TAPS for n in TAPS):
                     spacing, fine = _spacing(taps, share), _spacing(filter_taps, share)
                     if spacing is None or fine is None:
                         continue
-                    made = self._cost(chain, taps, spacing, filter_taps, fine)
-                    if made:
-                        yield made[0], (chain, taps, spacing, filter_taps, fine, made[1], share)
+                    estimate = self._cost(chain, taps, spacing, filter_taps, fine)
+                    if estimate:
+                        yield _Candidate(chain, taps, spacing, filter_taps, fine, share, *estimate)
 
-    def untried(self) -> str:
+    def obstacle(self) -> str:
         """The reason why there is no candidate at all."""
-        share = 0.75 * self.tolerance / 3  # of a tree of one level, which has the fewest errors
+        share = MERGING_SHARE * self.tolerance / 3  # of a tree of one level, which has the fewest errors
         fine = [s for s in (_spacing(filter_taps, share) for filter_taps in TAPS) if s is not None]
         if not fine:
             return f"the error of a filter of {TAPS[-1]} taps over the pulses is above its share of the tolerance"
@@ -183,12 +206,11 @@ class _Case:
         total += size * sources * leaf
         return total + n_rows * cost_model.MERGED_PROFILE * spacing * self.task.raw.n_samples, ratios
 
-    def build(
-        self, chain: tuple[int, ...], taps: int, spacing: float, filter_taps: int, fine: float, ratios: list[int],
-        share: float,
-    ) -> tuple[FactorPlan, Tiling] | str:  # fmt: skip
+    def build(self, candidate: _Candidate) -> tuple[FactorPlan, Tiling] | str:
         """The plan of a candidate, its errors computed for the track as it is; or the reason why they are too large."""
-        raw, grid = self.task.raw, self.task.grid
+        raw, grid, chain, share = self.task.raw, self.task.grid, candidate.chain, candidate.share
+        taps, spacing = candidate.taps, candidate.spacing
+        filter_taps, fine = candidate.filter_taps, candidate.fine
         between = interpolation.line_interpolator(taps, spacing)
         length = 2 * fft.good_length(int(np.ceil(spacing * raw.n_samples / 2)))
         sigma = 2 * float(raw.frequency_step.max()) * length / SPEED_OF_LIGHT
@@ -202,20 +224,20 @@ class _Case:
         factors = tuple(side // chain[-1] for side in chain)
         radii = tiling.level_radii(factors)
         decimations: list[Decimation] = []
-        known = _filter_errors.setdefault(self.task, {})
+        filter_errors = _filter_errors.setdefault(self.task, {})
         error, source = first.error + error_bounds.sum_rounding(64, raw.n_samples) * len(chain), self.track
-        for radius, ratio in zip(radii, ratios, strict=True):
+        for radius, ratio in zip(radii, candidate.ratios, strict=True):
             above = tuple(d.ratio for d in decimations)
             while True:
-                key, made = (filter_taps, fine, *above, ratio, radius), None
-                if key not in known:
-                    made = decimated(source, ratio, filter_taps, fine)
-                    known[key] = filter_error(source, made, self.points, radius, self.highest, self.axes)
-                if known[key] <= 1.3 * share or ratio <= 2:
+                key, decimation = (filter_taps, fine, *above, ratio, radius), None
+                if key not in filter_errors:
+                    decimation = decimated(source, ratio, filter_taps, fine)
+                    filter_errors[key] = filter_error(source, decimation, self.points, radius, self.highest, self.axes)
+                if filter_errors[key] <= SHARE_SLACK * share or ratio <= 2:
                     break
-                ratio = max(2, int(ratio * 0.75))
-            error += known[key] + (between.error if decimations else 0.0)
-            decimations.append(made or decimated(source, ratio, filter_taps, fine))
+                ratio = max(2, int(ratio * SMALLER_RATIO))
+            error += filter_errors[key] + (between.error if decimations else 0.0)
+            decimations.append(decimation or decimated(source, ratio, filter_taps, fine))
             source = decimations[-1].kept
         leaf = self._leaf(self.tolerance - error, source, (between, length), tiling)
         if leaf is None:
@@ -223,11 +245,7 @@ class _Case:
         edge = self._edge(tiling)
         if edge is None:
             return f"tiles at the edge of the range window cannot be focused{' by lines' if self.lines else ''}"
-        # from the leaves up: the profiles of a tile cover those of its children and what their interpolation reads
-        reach = [int(np.ceil(radii[-1] * sigma)) + LEAF_GUARD]
-        for below, radius in zip(radii[:0:-1], radii[-2::-1], strict=True):
-            apart = tiling.child_distance(radius, below)
-            reach.append(int(np.ceil(apart * sigma)) + reach[-1] + GUARD)
+        reach = _reaches(tiling, radii, sigma)
         if self.task.wrap and reach[-1] + 4 * GUARD > length:
             return "the largest tiles are wider than the period in which ranges repeat"
         levels = tuple(Level(*v) for v in zip(chain, radii, reach[::-1], decimations, strict=True))
@@ -235,24 +253,30 @@ class _Case:
         cost = grid.size * sources[-1] * leaf.cost + raw.n_rows * cost_model.MERGED_PROFILE * spacing * raw.n_samples
         for v, n in zip(levels, sources, strict=False):
             cost += grid.size / v.side**2 * n * moving_cost(2 * v.reach, taps, filter_taps)
-        return FactorPlan(
-            levels, factors, first, between, length, leaf, edge,
-            max(error + leaf.predicted_error, edge.predicted_error),  # a row is merged into a tile or added directly
-            cost / (raw.n_rows * grid.size), self.order,
-        ), tiling  # fmt: skip
+        plan = FactorPlan(
+            levels=levels,
+            factors=factors,
+            first=first,
+            between=between,
+            length=length,
+            leaf=leaf,
+            edge=edge,
+            # a row is merged into a tile or added directly
+            predicted_error=max(error + leaf.predicted_error, edge.predicted_error),
+            cost=cost / (raw.n_rows * grid.size),
+            order=self.order,
+        )
+        return plan, tiling
 
     def _leaf(
         self, tolerance: float, kept: PulseGeometry, source: tuple[Interpolator, int], tiling: Tiling
     ) -> LinePlan | Plan | None:
         """Plan from leaves to pixels within a tolerance; None: there is none."""
-        raw, n_samples = self.task.raw, self.task.raw.n_samples
+        raw = self.task.raw
         if tolerance <= 0:
             return None
         if self.lines:
-            return line_plan.choose(
-                tolerance, self.task.grid, kept, n_samples=n_samples, bandwidth=self.bandwidth,
-                highest=self.highest, source=source, sides=(tiling.side,),
-            )  # fmt: skip
+            return line_plan.choose(self.task, kept, tolerance, source=source, sides=(tiling.side,))
         best = None
         for mode in (0, 1):
             for order in (2, 3, 0):
@@ -269,18 +293,31 @@ class _Case:
         """Direct plan, on the same leaves, for tiles only partly in a range window or beam; None: there is none."""
         raw = self.task.raw
         if self.lines:
-            return line_plan.choose(
-                self.tolerance, self.task.grid, self.task.antennas, n_samples=raw.n_samples, bandwidth=self.bandwidth,
-                highest=self.highest, sides=(tiling.side,),
-            )  # fmt: skip
+            return line_plan.choose(self.task, self.task.antennas, self.tolerance, sides=(tiling.side,))
         try:
             return cheapest(
-                self.tolerance, [(tiling.per_tile, tiling.radius)], distance=self.distance, frequency=self.highest,
-                bandwidth=self.bandwidth, n_samples=raw.n_samples, points_per_row=self.task.grid.size, chunk=CHUNK,
+                self.tolerance,
+                [(tiling.per_tile, tiling.radius)],
+                distance=self.distance,
+                frequency=self.highest,
+                bandwidth=self.bandwidth,
+                n_samples=raw.n_samples,
+                points_per_row=self.task.grid.size,
+                chunk=CHUNK,
                 least_tolerance=0.0,
-            )  # fmt: skip
+            )
         except ToleranceUnreachable:
             return None
+
+
+def _reaches(tiling: Tiling, radii: list[float], sigma: float) -> list[int]:
+    """Samples of profiles on each side of a tile's centre, from the leaves up: the profiles of a tile cover those of
+    its children and what their interpolation reads; sigma: samples per metre."""
+    reach = [int(np.ceil(radii[-1] * sigma)) + LEAF_GUARD]
+    for below, radius in zip(radii[:0:-1], radii[-2::-1], strict=True):
+        apart = tiling.child_distance(radius, below)
+        reach.append(int(np.ceil(apart * sigma)) + reach[-1] + GUARD)
+    return reach
 
 
 def moving_cost(samples: float, taps: int, filter_taps: int) -> float:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -16,11 +15,11 @@ from ...opencl.launch_numbers import launch_numbers
 from ..engine import DirectEngine, RowProfiles, Skipped
 from ..focusing_task import FocusingTask
 from ..pixel_taper import WEIGHT_BUFFERS, TaperOnDevice
-from ..tiling.tiling import Tiling, download_sums
+from ..tiling.tiling import FlatImage, Tiling, download_sums
 from ._pulse_records import packed
 from .plan import CHUNK, Float64Plan
 
-N_CONST = 16  # of kernels/geometry_float64.clh
+N_CONST = 16  # numbers per pair of tile and pulse: N_CONST of kernels/geometry_float64.clh
 PIXEL_BYTES = 56  # bytes per pixel: position, sum, and the compensation of the sum
 
 
@@ -61,7 +60,7 @@ class DirectFloat64(DirectEngine):
         )
 
     def fill(
-        self, first: int, last: int, flat: Any, budget: float, clock: Clock, on_progress: Callable[[float], None]
+        self, first: int, last: int, flat: FlatImage, budget: float, clock: Clock, on_progress: Callable[[float], None]
     ) -> Skipped:
         """Focus bands first ... last - 1 into `flat`; see engine.Engine."""
         raw, tiling, middle = self.task.raw, self.tiling, self.task.raw.n_rows // 2
@@ -76,8 +75,8 @@ class DirectFloat64(DirectEngine):
             def part(rows_done: float, i: int = i) -> None:
                 on_progress((i * raw.n_rows + rows_done) / runs)
 
-            made, missed[:, run] = self._tiles(positions[run], budget, clock, part)
-            np.put_along_axis(values[run], lanes[run], made, axis=1)
+            sums, missed[:, run] = self._tiles(positions[run], budget, clock, part)
+            np.put_along_axis(values[run], lanes[run], sums, axis=1)
         tiling.place(values.ravel(), (first, last), 0, orders, flat)
         clock.lap("write")
         return Skipped.of_tiles(missed, tiling.tile_sizes(first, last))
@@ -94,10 +93,11 @@ class DirectFloat64(DirectEngine):
         radius = np.linalg.norm(positions - references[:, None], axis=-1).max(axis=-1)
         pixels = positions.shape[0] * positions.shape[1]
         image, missed = device.zeros(32 * pixels), device.zeros(8 * n_tiles)
-        where = device.upload(positions.reshape(-1, 3).T)
+        pixels_at = device.upload(positions.reshape(-1, 3).T)
         apertures = self.taper.apertures(positions)
         tile, reach = device.upload(references.T), device.upload(radius)
-        stride, wrap = self.profiles.stride, plan.length if self.task.wrap else 0
+        profiles = {"stride": self.profiles.stride, "origin": self.profiles.stride // 2}
+        skips = {"skip": self.task.skip_flags, "wrap": plan.length if self.task.wrap else 0}
         clock.lap("prepare")
         with self.profiles.pipeline as pipeline:
             for start in range(0, raw.n_rows, rows):
@@ -106,36 +106,28 @@ class DirectFloat64(DirectEngine):
                 block = self.profiles.upload(start, stop)
                 pulse_host = packed(raw, self.task.antennas, plan.length, start, stop, self.lanes)
                 pulse, n = pipeline.upload(pulse_host), pulse_host.shape[1]
-                weights = self.taper.arguments(apertures, start, stop)
+                weights = self.taper.arguments(apertures, start, stop) or WEIGHT_BUFFERS * (self.table,)
                 clock.lap("profiles")
                 at_once = min(budget / 4 / pipeline.held, device.info.max_alloc)
                 step = max(1, min(n_tiles, int(at_once / (8 * N_CONST * n))))
                 constants = device.empty(8 * N_CONST * n * step)
-                for at in range(0, n_tiles, step):
-                    count = min(step, n_tiles - at)
-                    device.run(
-                        self.constants, (n // self.lanes, count), None,
-                        launch_numbers(
-                            "tile_constants_float64.cl", "tile_constants", n=n, n_tiles=n_tiles, first=at,
-                            skip=self.task.skip_flags, wrap=wrap,
-                        ),
-                        pulse, tile, reach, constants,
-                    )  # fmt: skip
-                    items = positions.shape[1] // self.lanes
-                    device.run(
-                        self.kernel, (items, count), (items, 1) if items <= self.group else None,
-                        launch_numbers(
-                            "backproject_float64.cl", "backproject", stride=stride, origin=stride // 2, n=n,
-                            n_used=stop - start, n_tiles=n_tiles, first=at, pixels=pixels,
-                        ),
-                        block, self.table, pulse, constants, tile, where, image, missed,
-                        *(weights or WEIGHT_BUFFERS * (self.table,)), steps=stop - start,
-                    )  # fmt: skip
+                for first in range(0, n_tiles, step):
+                    size = (n // self.lanes, min(step, n_tiles - first))
+                    tiles = {"n": n, "n_tiles": n_tiles, "first": first}
+                    launch = launch_numbers("tile_constants_float64.cl", "tile_constants", **tiles, **skips)
+                    device.run(self.constants, size, None, launch, pulse, tile, reach, constants)
+                    size = (positions.shape[1] // self.lanes, size[1])
+                    group = (size[0], 1) if size[0] <= self.group else None
+                    launch = launch_numbers(
+                        "backproject_float64.cl", "backproject", **tiles, **profiles, n_used=stop - start, pixels=pixels
+                    )
+                    buffers = block, self.table, pulse, constants, tile, pixels_at, image, missed
+                    device.run(self.kernel, size, group, launch, *buffers, *weights, steps=stop - start)
                 pipeline.step(partial(on_progress, stop))
                 clock.lap("backproject")
         clock.lap("backproject")
-        made = download_sums(device, image, pixels, np.float64).reshape(positions.shape[:2])
-        return made, device.download(missed, np.empty((2, n_tiles), np.int32)).astype(np.int64)
+        values = download_sums(device, image, pixels, np.float64).reshape(positions.shape[:2])
+        return values, device.download(missed, np.empty((2, n_tiles), np.int32)).astype(np.int64)
 
 
 def _no_float64(device: Device) -> str:
@@ -143,7 +135,7 @@ def _no_float64(device: Device) -> str:
 
 
 def remedy() -> str:
-    """What to do on a device without float64."""
+    """Remedy on a device without float64."""
     able = [f"{i.index}: {i.name}" for i in devices() if i.works and i.fp64]
     return f"choose device= one of {'; '.join(able)}" if able else "no device here has float64"
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -27,7 +26,7 @@ WIDE = -1  # order of plans that compute every path in pairs of float64
 
 @dataclass(frozen=True, eq=False)
 class Float64Plan:
-    """How an image is computed in float64.
+    """Plan of an image in float64.
 
     length        samples of a range profile
     per_tile      pixels of a tile
@@ -44,7 +43,7 @@ class Float64Plan:
     cost: float
     next_cheaper: Float64Plan | None = None
 
-    def describe(self, method: str) -> dict[str, Any]:
+    def describe(self, method: str) -> dict[str, object]:
         """The plan in words and numbers, for a report."""
         words = {
             "method": method,
@@ -87,10 +86,9 @@ def make_plan(task: FocusingTask, tolerance: float) -> tuple[Float64Plan, Tiling
     if good is None:
         ratio = 20 * np.log10(energy.near_pixels)
         dark = f": these pixels are {ratio:.0f} dB darker than their surroundings in the same rows"
-        raise ToleranceUnreachable(
-            tolerance, askable(rounded_up(min(p.predicted_error for p in plans))), "float64 range profiles",
-            how=f"in complex128{dark if energy.near_pixels > 10 else ''}",
-        )  # fmt: skip
+        best = askable(rounded_up(min(p.predicted_error for p in plans)))
+        how = f"in complex128{dark if energy.near_pixels > 10 else ''}"
+        raise ToleranceUnreachable(tolerance, best, "float64 range profiles", how=how)
     cheaper = [p for p in plans if p.cost < good.cost]
     other = min(cheaper, key=lambda p: p.predicted_error, default=None)
     named = Float64Plan(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from ...opencl.device import Device
 from ...opencl.pipeline import Pipeline
 from ..focusing_task import FocusingTask
 from ._wavefront import Waves
+
+if TYPE_CHECKING:
+    from ...opencl.device import Buffer
 
 
 class WeightedRows:
@@ -29,13 +32,13 @@ class WeightedRows:
         self.held, self.row_bytes, self.largest = True, 0.0, 0.0
         self._energies = np.zeros(task.raw.n_rows)  # of rows that the host has weighed
         self._weigher: WeightedSamples | None = None
-        self._out: Any = None
+        self._out: Buffer | None = None
         self._rows = 0
         if fft.on_device(device, task.raw.n_samples, np.complex64):
             self._weigher = WeightedSamples(device, task.sample_weight, task.raw.n_rows, task.raw.samples.dtype)
             self.row_bytes = self._weigher.row_bytes
 
-    def buffer(self, pipeline: Pipeline, start: int, stop: int) -> Any:
+    def buffer(self, pipeline: Pipeline, start: int, stop: int) -> Buffer:
         """Rows start ... stop - 1 in a buffer, which may be the one of the call before."""
         if self._weigher is None:
             return self.device.upload(self._on_host(start, stop))
@@ -52,6 +55,7 @@ class WeightedRows:
         else:
             self.held = False
             self.device.write(self._out, self._on_host(start, stop))
+        assert self._out is not None
         return self._out
 
     def energy(self) -> float:
@@ -67,13 +71,13 @@ class WeightedRows:
         """Samples of rows start ... stop - 1 times their weights, with phases relative to the centre: complex64."""
         task, rows = self.task, slice(start, stop)
         raw = task.raw
-        made = raw.read(start, stop) * np.outer(task.row_weight[rows], task.sample_weight).astype(np.float32)
+        samples = raw.read(start, stop) * np.outer(task.row_weight[rows], task.sample_weight).astype(np.float32)
         # where the reference is the centre, the shift is rounding alone
         shift = float(np.abs(self.waves.shift[rows]).max())
         if shift * 4 * np.pi * task.highest / SPEED_OF_LIGHT > 1e-3 * self.tolerance:
             first, step = (cycles[:, None] for cycles in self._cycles(rows))
-            made = made * np.exp(2j * np.pi * (first + step * np.arange(raw.n_samples)))
-        largest = float(np.abs(made).max(initial=0.0))
+            samples = samples * np.exp(2j * np.pi * (first + step * np.arange(raw.n_samples)))
+        largest = float(np.abs(samples).max(initial=0.0))
         self.largest = max(self.largest, largest)
         n_samples = raw.n_rows * raw.n_samples
         if largest > LARGEST[np.complex64] / n_samples:
@@ -81,6 +85,6 @@ class WeightedRows:
                 f"samples times weights reach {largest:.1e}; sums of {n_samples} in complex64 hold up to "
                 f"{LARGEST[np.complex64]:.0e}: scale the samples down"
             )
-        out = made.astype(np.complex64)
+        out = samples.astype(np.complex64)
         self._energies[rows] = (out.real.astype(np.float64) ** 2 + out.imag.astype(np.float64) ** 2).sum(axis=1)
         return out

@@ -57,14 +57,16 @@ def waves_about(raw: PhaseHistory, center: np.ndarray) -> Waves:
         away = positions - center
         distance = np.linalg.norm(away, axis=1)
         if not distance.all():
-            at = int(np.argmin(distance))
-            raise ValueError(f"{name}[{at}] is at the grid's centre, where waves have no direction")
+            row = int(np.argmin(distance))
+            raise ValueError(f"{name}[{row}] is at the grid's centre, where waves have no direction")
         # in float64 the difference has an error of 4e-9 m at 36 000 km: 1e-5 rad at 60 GHz
-        wide, known = positions.astype(np.longdouble) - center, raw.reference_range.astype(np.longdouble)
+        wide, reference = positions.astype(np.longdouble) - center, raw.reference_range.astype(np.longdouble)
         length = np.sqrt((wide**2).sum(axis=1))
-        total = length + known  # not above 0 for a reference range that is negative: there the quotient gains nothing
-        quotient = ((wide**2).sum(axis=1) - known**2) / np.where(total > 0, total, 1)
-        shifts.append(np.where(total > 0, quotient, length - known))
+        total = (
+            length + reference
+        )  # not above 0 for a reference range that is negative: there the quotient gains nothing
+        quotient = ((wide**2).sum(axis=1) - reference**2) / np.where(total > 0, total, 1)
+        shifts.append(np.where(total > 0, quotient, length - reference))
         units.append(away / distance[:, None])
         distances.append(distance)
     return Waves(center, np.stack(units), np.stack(distances), np.mean(shifts, axis=0).astype(np.float64))

@@ -219,6 +219,6 @@ def _measure_error(task: FocusingTask, waves: Waves, data: np.ndarray) -> float:
     from ...reference.polar_format import polar_format as exact
 
     index, positions = task.grid.sample(CHECKED, seed=0)
-    wanted, random = exact(task.raw, positions, waves.center, task.sample_weight, task.row_weight)
-    wrong = float(np.linalg.norm(data[index] - wanted))
-    return wrong / max(float(np.linalg.norm(wanted)), random) if wrong else 0.0
+    truth, random = exact(task.raw, positions, waves.center, task.sample_weight, task.row_weight)
+    wrong = float(np.linalg.norm(data[index] - truth))
+    return wrong / max(float(np.linalg.norm(truth)), random) if wrong else 0.0

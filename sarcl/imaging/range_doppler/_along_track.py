@@ -16,7 +16,7 @@ from ._host_rows import ARRAYS, Budget
 from ._plan import FocusPlan
 
 PIECE = 64  # columns that are transformed at a time, for the cache
-TERMS = 1024  # of a sum in complex64, before it is added to a total in complex128
+TERMS = 1024  # terms of a sum in complex64, before it is added to a total in complex128
 
 
 class Spectra:
@@ -75,8 +75,8 @@ class ImageRows:
         width = _columns(self._made, self._budget)
         for start in range(0, n_ranges, width):
             columns = slice(start, start + width)
-            made = fft.rows(None, np.ascontiguousarray(self._made[:, columns].T), inverse=True)
-            image[:, columns] = made[:, :n_times].T * level[columns]
+            profiles = fft.rows(None, np.ascontiguousarray(self._made[:, columns].T), inverse=True)
+            image[:, columns] = profiles[:, :n_times].T * level[columns]
         return image
 
 
@@ -87,9 +87,9 @@ def sums(values: np.ndarray, places: np.ndarray, wanted: np.ndarray, period: int
     """
     total = np.zeros((len(wanted), values.shape[1]), np.complex128)
     for start in range(0, len(places), TERMS):
-        some = slice(start, start + TERMS)
-        cycles = np.outer(wanted, places[some]) % period / period
-        total += np.exp(sign * 2j * np.pi * cycles).astype(np.complex64) @ values[some]
+        terms = slice(start, start + TERMS)
+        cycles = np.outer(wanted, places[terms]) % period / period
+        total += np.exp(sign * 2j * np.pi * cycles).astype(np.complex64) @ values[terms]
     return total
 
 

@@ -22,7 +22,7 @@ LEAST_ZONES = 1.5  # Fresnel zones, smallest width of B
 INWARDS = 1 / 8, 3 / 16, 1 / 4, 5 / 16, 3 / 8, 7 / 16, 1 / 2
 OUTSIDE = 4e-3
 FINE, FINEST = 32, 2048  # least cells of the table per Fresnel zone, and in the beam
-FAINTEST = 1e-9  # of the largest weight: smaller ones are rounding of an FFT
+FAINTEST = 1e-9  # share of the largest weight: smaller ones are rounding of an FFT
 MARGIN = 12.0  # Fresnel zones beside the beam in which the stationary phase is compared: it spreads by a few
 
 
@@ -49,11 +49,11 @@ class ApertureWindow:
         zones = LEAST_ZONES
         while True:
             for inwards in INWARDS:
-                made = cls._smoothed(low, high, table, zone, zones, inwards)
-                if made.error > allowed or made.outside(low, high) <= OUTSIDE:
+                window = cls._smoothed(low, high, table, zone, zones, inwards)
+                if window.error > allowed or window.outside(low, high) <= OUTSIDE:
                     break
-            if made.error <= allowed:
-                return made
+            if window.error <= allowed:
+                return window
             zones *= 1.2
 
     def outside(self, low: float, high: float) -> float:
@@ -76,9 +76,9 @@ class ApertureWindow:
         n = int(np.ceil((high - low) / step)) + 2 * half + 1
         sines = (low + high) / 2 + step * (np.arange(n) - (n - 1) / 2)
         inside = (sines >= low) & (sines <= high)
-        ends, at = _tangent(np.array([low, high])), _tangent(np.clip(sines, low, high))
+        ends, tangents = _tangent(np.array([low, high])), _tangent(np.clip(sines, low, high))
         cells = (np.arange(len(table)) + 0.5) / len(table)
-        window = np.interp((at - ends[0]) / (ends[1] - ends[0]), cells, table) * inside
+        window = np.interp((tangents - ends[0]) / (ends[1] - ends[0]), cells, table) * inside
         x = (np.arange(2 * half + 1) + 0.5) / (2 * half + 1)
         bump = (x * (1 - x)) ** 2  # its integral is the rise x^3 (10 - 15 x + 6 x^2) of the ends of a band
         weights = fftconvolve(window, bump / bump.sum(), mode="same")

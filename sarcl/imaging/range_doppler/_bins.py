@@ -60,16 +60,18 @@ class Bins:
         ranges, blocks = self.plan.ranges, self.plan.blocks
         doppler = numbers / (self.plan.length * self.track.step)
         shares = self.shares()
-        made: dict[int, np.ndarray] = {}  # profiles of the nodes about a block
+        profiles: dict[int, np.ndarray] = {}  # profiles of the nodes about a block
         for i, (first, last) in enumerate(blocks):
             near = self.near(i)
-            made = {k: made[k] if k in made else self._profiles(spectra, doppler, self.nodes[k]) for k in near}
-            here = ranges[first:last]
+            profiles = {
+                k: profiles[k] if k in profiles else self._profiles(spectra, doppler, self.nodes[k]) for k in near
+            }
+            columns = ranges[first:last]
             if len(blocks) == 1:
-                yield slice(first, last), self._straightened(made[0], doppler, here)
+                yield slice(first, last), self._straightened(profiles[0], doppler, columns)
                 return
             parts = (
-                share[first:last] * self._straightened(made[k], doppler, here)
+                share[first:last] * self._straightened(profiles[k], doppler, columns)
                 for share, k in zip(shares, near, strict=True)
             )
             yield slice(first, last), sum(parts, np.zeros((), np.complex64))
@@ -119,13 +121,12 @@ class Bins:
         cell, line = self.lines(doppler, ranges)
         n_segments = cell.shape[1]
         out = device.empty(8 * len(doppler) * n_segments * SEGMENT)
-        device.run(
-            self.kernel, (n_segments, len(doppler)), (1, 1) if device.is_cpu else None,
-            device.upload(profiles), profiles.shape[1], self.pad + self.plan.profile_length // 2,
-            device.upload(cell), device.upload(line), self.table, out,
-        )  # fmt: skip
-        made = device.download(out, np.empty((len(doppler), n_segments * SEGMENT), np.complex64))
-        return made[:, : len(ranges)]
+        size, group = (n_segments, len(doppler)), (1, 1) if device.is_cpu else None
+        origin = self.pad + self.plan.profile_length // 2
+        buffers = device.upload(cell), device.upload(line), self.table, out
+        device.run(self.kernel, size, group, device.upload(profiles), profiles.shape[1], origin, *buffers)
+        columns = device.download(out, np.empty((len(doppler), n_segments * SEGMENT), np.complex64))
+        return columns[:, : len(ranges)]
 
     def _filter(self, doppler: np.ndarray, middle: float) -> np.ndarray:
         """Secondary range compression for a slant range, amplitude and taper: complex64 (bins, n_samples)."""
@@ -164,8 +165,8 @@ class Bins:
         cycles += doppler[:, None] * (start + shift)
         step, slope = np.diff(position) / SEGMENT, np.diff(cycles) / SEGMENT
         position, cycles = position[:, :-1], cycles[:, :-1]
-        whole = np.floor(position)
+        samples = np.floor(position)
         length = self.plan.profile_length
-        cell = ((whole + length // 2) % length - length // 2).astype(np.int32)
-        line = np.stack([position - whole, step, cycles - np.rint(cycles), slope - np.rint(slope)], axis=-1)
+        cell = ((samples + length // 2) % length - length // 2).astype(np.int32)
+        line = np.stack([position - samples, step, cycles - np.rint(cycles), slope - np.rint(slope)], axis=-1)
         return cell, line.astype(np.float32)

@@ -40,9 +40,7 @@ class Band:
     window: ApertureWindow | None = None
 
     @classmethod
-    def tapered(
-        cls, low: float, high: float, pixel_band: float, zone: float, allowed: float, has_beam: bool
-    ) -> Band:  # fmt: skip
+    def tapered(cls, low: float, high: float, pixel_band: float, zone: float, allowed: float, has_beam: bool) -> Band:
         """The band whose tapers are as wide as an error of `allowed` needs.
 
         pixel_band  difference of the sines under which rows see one pixel;  zone  width of a Fresnel zone, as a sine
@@ -53,8 +51,9 @@ class Band:
         return cls(low, high, zones * zone, float(ringing) / zones**3)
 
     @classmethod
-    def windowed(cls, window: ApertureWindow, corners: tuple[float, float], pixel_band: float, zone: float,
-                 allowed: float) -> Band:  # fmt: skip
+    def windowed(
+        cls, window: ApertureWindow, corners: tuple[float, float], pixel_band: float, zone: float, allowed: float
+    ) -> Band:
         """The band of a window over the beam; it is cut off, with tapers, where no row sees the image, at `corners`."""
         low, high = window.ends
         used = max(low, corners[0]), min(high, corners[1])
@@ -66,8 +65,8 @@ class Band:
     def weight(self, sines: np.ndarray) -> np.ndarray:
         """Weights of Doppler bins at sines (...): 1 or the window in the band, falling to 0 over the tapers."""
         rise = self._rise(sines)
-        made = np.asarray(rise**3 * (10 - 15 * rise + 6 * rise * rise))
-        return made if self.window is None else made * self.window.weight(sines)
+        taper = np.asarray(rise**3 * (10 - 15 * rise + 6 * rise * rise))
+        return taper if self.window is None else taper * self.window.weight(sines)
 
     def row_weight(self, sines: np.ndarray, zones: np.ndarray | float) -> np.ndarray:
         """Weights, complex (...), that rows have at sines of squint angles where Doppler bins have `weight`.
@@ -137,11 +136,11 @@ def centroid_of_data(raw: PhaseHistory, step: float, speed: float, expected: flo
     if total == 0:
         raise ValueError("the echoes are zero, and have no Doppler centroid: give doppler='geometry'")
     rate, wavelength = 1 / step, SPEED_OF_LIGHT / float(raw.center_frequency[0])
-    found, wanted = np.angle(total) / (2 * np.pi) * rate, 2 * speed * expected / wavelength
-    found += rate * np.rint((wanted - found) / rate)
+    centroid, prediction = np.angle(total) / (2 * np.pi) * rate, 2 * speed * expected / wavelength
+    centroid += rate * np.rint((prediction - centroid) / rate)
     if doubt:
-        _doubt(products, frequency, rate, float(found), float(wanted))
-    return float(np.clip(wavelength * found / (2 * speed), -STEEPEST, STEEPEST))
+        _doubt(products, frequency, rate, float(centroid), float(prediction))
+    return float(np.clip(wavelength * centroid / (2 * speed), -STEEPEST, STEEPEST))
 
 
 def _doubt(products: np.ndarray, frequency: np.ndarray, rate: float, found: float, wanted: float) -> None:
@@ -155,9 +154,9 @@ def _doubt(products: np.ndarray, frequency: np.ndarray, rate: float, found: floa
     parts = np.stack([part.sum(axis=0, dtype=np.complex128) for part in np.array_split(products, PARTS)])
     apart = float(frequency[half:].mean() - frequency[:half].mean())
     turns = np.angle(parts[:, half:].sum(axis=1) * parts[:, :half].sum(axis=1).conj()) / (2 * np.pi)
-    told = turns * rate * float(frequency.mean()) / apart
-    deviation = float(told.std() / np.sqrt(PARTS - 1))
-    absolute = float(np.median(told))
+    estimates = turns * rate * float(frequency.mean()) / apart
+    deviation = float(estimates.std() / np.sqrt(PARTS - 1))
+    absolute = float(np.median(estimates))
     nearest = found + rate * round((absolute - found) / rate)
     if abs(nearest - found) > rate / 2 and SURE * deviation < rate / 2:
         warn(

@@ -1,4 +1,4 @@
-"""Which zero-Doppler times and slant ranges an image has, and the Doppler band that it needs."""
+"""Zero-Doppler times and slant ranges of an image, and the Doppler band that it needs."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from ._range_window import RangeWindow
 from ._track import REMEDY, Track
 from ._velocity import Positions
 
-FILLED = 0.8  # of the sampling rate along rows and columns that the spectrum of a pixel fills, by default
-HELD = 0.6  # of the slant ranges that the range window holds at one time: default times leave as many
+FILLED = 0.8  # share of the sampling rate along rows and columns that the spectrum of a pixel fills, by default
+HELD = 0.6  # share of the slant ranges in the range window at one time that default times leave
 MOST_PIXELS = 2**31
 PIXEL_BYTES = 8 + 2 * 24  # a pixel, and its position while a grid is made
 
@@ -60,17 +60,32 @@ class Extent:
         return np.flatnonzero((s >= self.band.low) & (s <= self.band.high))
 
 
-def choose_extent(
-    raw: PhaseHistory, track: Track, positions: Positions, options: RangeDopplerOptions, *, speed: float,
-    centroid: float, least: float, allowed: float, times: tuple[float, float] | None,
-) -> Extent:  # fmt: skip
-    """The extent that `options` ask for, or the default.
+@dataclass(frozen=True, eq=False)
+class View:
+    """Echoes, and how their track sees the ground.
 
-    speed     effective velocity, m/s;  centroid  sine of the squint angle of the Doppler centroid
-    least     shortest slant range that reaches the ground, m;  allowed  error of the ends of the Doppler band
-    times     zero-Doppler times asked for, s from the first row, or None
+    positions  on the ground, of zero-Doppler times and slant ranges
+    speed      effective velocity, m/s;  centroid  sine of the squint angle of the Doppler centroid
+    least      shortest slant range that reaches the ground, m
+    """
+
+    raw: PhaseHistory
+    track: Track
+    positions: Positions
+    speed: float
+    centroid: float
+    least: float
+
+
+def choose_extent(view: View, options: RangeDopplerOptions, allowed: float) -> Extent:
+    """The extent that `options` ask for, or the default; allowed  error of the ends of the Doppler band.
+
     ValueError: a pulse rate below the Doppler bandwidth, ranges outside the range window, empty images.
     """
+    raw, track, speed, centroid, least = view.raw, view.track, view.speed, view.centroid, view.least
+    times: tuple[float, float] | None = None
+    if options.times is not None:
+        times = options.times[0] - track.epoch, options.times[1] - track.epoch
     if abs(centroid) > STEEPEST:
         raise ValueError(
             f"the Doppler centroid is {np.degrees(np.arcsin(np.clip(centroid, -1, 1))):.3g} degrees from broadside, "
@@ -82,7 +97,7 @@ def choose_extent(
     at_middle = float(raw.reference_range[raw.n_rows // 2]) * np.sqrt(1 - centroid**2)
     about = max(at_middle if ranges is None else sum(ranges) / 2, least)
     sight = _Sight(track, speed, centroid, beam, float(raw.center_frequency[0]), about)
-    window = RangeWindow(raw, track, positions, speed, sight.sines, least, about)
+    window = RangeWindow(raw, track, view.positions, speed, sight.sines, least, about)
     middle = sight.middle if times is None else sum(times) / 2
     pixel = sight.rows_at(middle)
     pixel_band = float(np.ptp(pixel))
@@ -150,7 +165,7 @@ def _sines_used(sight: _Sight, corners: np.ndarray, times: np.ndarray) -> tuple[
 
 @dataclass(frozen=True, eq=False)
 class _Sight:
-    """How rows see points: about the Doppler centroid, a sine, within a beam, rad, or wherever (None).
+    """View of points from the rows: about the Doppler centroid, a sine, within a beam, rad, or wherever (None).
 
     speed      effective velocity, m/s: Doppler frequencies are 2 f speed/c times the sines of this file. Those of the
                antenna's angles are speed/track.speed times as large, since its own speed makes the same frequencies

@@ -17,44 +17,38 @@ import numpy as np
 
 from ...base import host_memory
 from ...base.stage_timer import Clock
-from ...model.phase_history import PhaseHistory
 from ...numerics import range_profiles
-from ...opencl.device import Device
 from ._along_track import ImageRows, Spectra
 from ._bins import Bins
 from ._focus_on_device import focus_on_device
-from ._host_rows import ARRAYS, Budget, referenced
-from ._plan import FocusPlan
-from ._track import Track
+from ._host_rows import ARRAYS, Job, referenced
 
 PIECE = 64  # rows that are made at a time, for the cache
 
 
-def focus(
-    device: Device, plan: FocusPlan, raw: PhaseHistory, track: Track, weights: tuple[np.ndarray, np.ndarray],
-    budget: Budget, clock: Clock, on_progress: Callable[[float], None],
-) -> np.ndarray:  # fmt: skip
+def focus(job: Job, clock: Clock, on_progress: Callable[[float], None]) -> np.ndarray:
     """The image complex64 (times, ranges), from the rows times weights of samples and of rows.
 
     MemoryError where neither memory nor temporary files hold the rows, their spectra or the compressed bins.
     """
-    if not device.is_cpu and not plan.far_fewer(raw.n_rows):
-        image = focus_on_device(device, plan, raw, track, weights, budget, clock, on_progress)
+    device, plan, budget = job.device, job.plan, job.budget
+    if not device.is_cpu and not plan.far_fewer(job.raw.n_rows):
+        image = focus_on_device(job, clock, on_progress)
         if image is not None:
             return image
-    rows = _rows(plan, raw, weights, budget)
+    rows = _rows(job)
     clock.lap("samples")
     spectra = Spectra(plan, rows, budget)
     del rows
     clock.lap("fft")
     on_progress(0.3)
-    bins = Bins(device, plan, raw, track)
+    bins = Bins(device, plan, job.raw, job.track)
     compressed = ImageRows(plan, budget)
     at_once = bins.at_once(budget.device)
     for start in range(0, len(plan.bins), at_once):
         numbers = plan.bins[start : start + at_once]
-        for columns, made in bins.compressed(spectra.at(numbers), numbers):
-            compressed.add(numbers, columns, made)
+        for columns, values in bins.compressed(spectra.at(numbers), numbers):
+            compressed.add(numbers, columns, values)
         clock.lap("migration")
         on_progress(0.3 + 0.5 * (start + len(numbers)) / len(plan.bins))
     del spectra
@@ -64,13 +58,13 @@ def focus(
     return image
 
 
-def _rows(plan: FocusPlan, raw: PhaseHistory, weights: tuple[np.ndarray, np.ndarray], budget: Budget) -> np.ndarray:
+def _rows(job: Job) -> np.ndarray:
     """The rows, weighted, all with the reference range plan.center: complex64 (n_rows, n_samples)."""
-    rows = host_memory.zeros((raw.n_rows, raw.n_samples), budget.host / ARRAYS, "rows of samples")
+    n_rows = job.raw.n_rows
+    rows = host_memory.zeros((n_rows, job.raw.n_samples), job.budget.host / ARRAYS, "rows of samples")
     largest = 0.0
-    for start in range(0, raw.n_rows, PIECE):
-        made, here = referenced(raw, start, min(start + PIECE, raw.n_rows), plan.center, weights)
-        rows[start : start + PIECE] = made
-        largest = max(largest, here)
+    for start in range(0, n_rows, PIECE):
+        rows[start : start + PIECE], modulus = referenced(job, start, min(start + PIECE, n_rows))
+        largest = max(largest, modulus)
     range_profiles.check_digits(largest)
     return rows

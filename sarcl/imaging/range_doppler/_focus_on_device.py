@@ -8,14 +8,14 @@ down in blocks.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ...base import float_pairs, host_memory
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.stage_timer import Clock
-from ...model.phase_history import PhaseHistory
 from ...numerics.range_profiles import check_digits
 from ...numerics.transforms import Transforms
 from ...numerics.weighted_samples import WeightedSamples, bound_of_held
@@ -25,32 +25,32 @@ from ...opencl.launch_numbers import launch_numbers
 from ...opencl.pipeline import SLOTS, Pipeline
 from ._bins import Bins
 from ._doppler import EVANESCENT
-from ._host_rows import ARRAYS, Budget, referenced, turns
+from ._host_rows import ARRAYS, Job, referenced, turns
 from ._plan import SEGMENT, FocusPlan
-from ._track import Track
 
-LENGTHS = 3  # of FFTs: along the track, of range profiles, back; the programs of each keep what they take
+if TYPE_CHECKING:
+    from ...opencl.device import Buffer
+
+LENGTHS = 3  # lengths of FFTs: along the track, of range profiles, back; the programs of each keep their memory
 WORK = 1 / 16  # share of a budget for the rows that are transformed at a time, with one of these lengths
 UPLOAD = 2**26  # bytes of samples that are uploaded at a time
 PIECE = 64  # rows that the host refers to one range at a time
 BLOCKS = 8  # blocks of Doppler bins, at least, so that the host works on one while the device does another
 
 
-def focus_on_device(
-    device: Device, plan: FocusPlan, raw: PhaseHistory, track: Track, weights: tuple[np.ndarray, np.ndarray],
-    budget: Budget, clock: Clock, on_progress: Callable[[float], None],
-) -> np.ndarray | None:  # fmt: skip
+def focus_on_device(job: Job, clock: Clock, on_progress: Callable[[float], None]) -> np.ndarray | None:
     """The image complex64 (times, ranges), as `focus` makes it; None where the host must make it.
 
     That is where the device has no room for a row of a transform, or may not hold the sums of the samples.
     """
-    weigher = WeightedSamples(device, weights[0], raw.n_rows, np.dtype(raw.samples.dtype))
-    bins = Bins(device, plan, raw, track)
-    room = Room.for_task(device, plan, bins, raw.n_rows, weigher.row_bytes, budget.device)
+    device, plan, raw = job.device, job.plan, job.raw
+    weigher = WeightedSamples(device, job.weights[0], raw.n_rows, np.dtype(raw.samples.dtype))
+    bins = Bins(device, plan, raw, job.track)
+    room = Room.for_task(device, plan, bins, raw.n_rows, weigher.row_bytes, job.budget.device)
     if room is None:
         return None
     spectra = _Array(device, (max(raw.n_rows, plan.length), raw.n_samples), room.spectra)
-    if not (_refer if room.spectra else _refer_on_host)(device, spectra, plan, raw, weights, weigher, room, budget):
+    if not (_refer(job, spectra, weigher, room) if room.spectra else _refer_on_host(job, spectra, weigher)):
         return None
     clock.lap("samples")
     del weigher
@@ -62,7 +62,7 @@ def focus_on_device(
     if room.folded:
         folded.buffer = device.zeros(8 * folded.shape[0] * folded.shape[1])
     else:
-        folded.host = host_memory.zeros(folded.shape, budget.host / ARRAYS, "Doppler bins of the columns")
+        folded.host = host_memory.zeros(folded.shape, job.budget.host / ARRAYS, "Doppler bins of the columns")
 
     def on_bins(done: float) -> None:
         clock.lap("migration")
@@ -77,20 +77,24 @@ def focus_on_device(
     return image
 
 
+@dataclass(frozen=True)
 class Room:
-    """What fits on a device.
+    """Arrays and blocks that fit on a device.
 
     spectra, folded  whether the rows and their spectra stay there, and the compressed Doppler bins
     work     bytes for the rows of a transform;  left  for blocks of all else;  bins  Doppler bins at a time
     """
 
-    def __init__(self, spectra: bool, folded: bool, work: float, left: float, bins: int) -> None:
-        self.spectra, self.folded, self.work, self.left, self.bins = spectra, folded, work, left, bins
+    spectra: bool
+    folded: bool
+    work: float
+    left: float
+    bins: int
 
     @classmethod
     def for_task(
         cls, device: Device, plan: FocusPlan, bins: Bins, n_rows: int, row_bytes: float, budget: float
-    ) -> Room | None:  # fmt: skip
+    ) -> Room | None:
         """The room of a task; None where a row of a transform, or a Doppler bin, does not fit.
 
         row_bytes  of the samples of a row that are being uploaded
@@ -112,24 +116,35 @@ class Room:
         if folded > spectra:  # the larger one costs more to move
             order[1:3] = order[2], order[1]
         for keeps in order:
-            held = [n for n, kept in zip((spectra, folded), keeps, strict=True) if kept]
-            left = budget - LENGTHS * work - tables - sum(held)
+            resident = [n for n, kept in zip((spectra, folded), keeps, strict=True) if kept]
+            remainder = budget - LENGTHS * work - tables - sum(resident)
             each = profiles + uploads + (0 if keeps[0] else 8 * n_samples) + (0 if keeps[1] else 8 * n_ranges)
             if (
-                left >= max(each, row_bytes, 0 if all(keeps) else column)
-                and max(held, default=0) <= device.info.max_alloc
+                remainder >= max(each, row_bytes, 0 if all(keeps) else column)
+                and max(resident, default=0) <= device.info.max_alloc
             ):
                 most = min(period, max(PIECE, -(-len(plan.bins) // BLOCKS)))
                 largest = max(8.0 * (plan.profile_length + 2 * bins.pad), 8.0 * n_samples, 8.0 * n_ranges)
-                return cls(*keeps, work, left, max(1, int(min(most, left / each, device.info.max_alloc / largest))))
+                return cls(
+                    *keeps, work, remainder, max(1, int(min(most, remainder / each, device.info.max_alloc / largest)))
+                )
         return None
+
+
+class _Rows(NamedTuple):
+    """Rows of an array on the device, from `first` on, that begin again after `period`; is_new  they hold no values."""
+
+    buffer: Buffer
+    first: int
+    period: int
+    is_new: bool = False
 
 
 class _Array:
     """An array complex64 on the device, in `buffer`, or in `host`: in memory or a file."""
 
-    buffer: Any = None
-    host: Any = None
+    buffer: Buffer
+    host: np.ndarray
 
     def __init__(self, device: Device, shape: tuple[int, int], resident: bool) -> None:
         self.device, self.shape, self.resident = device, shape, resident
@@ -140,21 +155,21 @@ class _Array:
         sign  1, or -1 for transforms with exp(+j ...)
         """
         device, width = self.device, self.shape[1]
-        made = Transforms(device, length, width, room.work)
+        transforms = Transforms(device, length, width, room.work)
         weights = device.copied(np.ones(n, np.float32)), n
         if self.resident:
-            for first in range(0, width, made.most):
-                count = min(made.most, width - first)
-                made.columns(self.buffer, (n_rows, width), first, count)
-                made.lay(self.buffer, width, first, count, weights, 0, sign)
+            for first in range(0, width, transforms.most):
+                count = min(transforms.most, width - first)
+                transforms.columns(self.buffer, (n_rows, width), first, count)
+                transforms.lay(self.buffer, width, first, count, weights, 0, sign)
             return
-        at_once = max(1, min(made.most, int(room.left // (8 * (n_rows + n)))))
+        at_once = max(1, min(transforms.most, int(room.left // (8 * (n_rows + n)))))
         for first in range(0, width, at_once):
             part = np.ascontiguousarray(self.host[:n_rows, first : first + at_once])
             count = part.shape[1]
-            made.columns(device.upload(part), part.shape, 0, count)
+            transforms.columns(device.upload(part), part.shape, 0, count)
             out = device.empty(8 * n * count)
-            made.lay(out, count, 0, count, weights, 0, sign)
+            transforms.lay(out, count, 0, count, weights, 0, sign)
             self.host[:n, first : first + count] = device.download(out, np.empty((n, count), np.complex64))
 
     def rows(self, n: int) -> np.ndarray:
@@ -164,37 +179,32 @@ class _Array:
         return np.array(self.host[:n])
 
 
-def _refer(
-    device: Device, rows: _Array, plan: FocusPlan, raw: PhaseHistory, weights: tuple[np.ndarray, np.ndarray],
-    weigher: WeightedSamples, room: Room, budget: Budget,
-) -> bool:  # fmt: skip
+def _refer(job: Job, rows: _Array, weigher: WeightedSamples, room: Room) -> bool:
     """Weighted rows of one reference range, made on the device; False where it may not hold their sums."""
-    rows.buffer = device.empty(8 * rows.shape[0] * rows.shape[1])
+    raw = job.raw
+    rows.buffer = job.device.empty(8 * rows.shape[0] * rows.shape[1])
     at_once = max(1, int(min(room.left, UPLOAD) // weigher.row_bytes))
-    with Pipeline(device) as pipeline:
+    with Pipeline(job.device) as pipeline:
         for start in range(0, raw.n_rows, at_once):
             stop = min(start + at_once, raw.n_rows)
-            samples, along = raw.read(start, stop), weights[1][start:stop]
+            samples, along = raw.read(start, stop), job.weights[1][start:stop]
             if weigher.bound(samples, along) is None:
                 return False
             pipeline.new_block()
-            weigher.make(pipeline, samples, along, turns(raw, start, stop, plan.center), rows.buffer, start)
+            weigher.make(pipeline, samples, along, turns(raw, start, stop, job.plan.center), rows.buffer, start)
             pipeline.step()
     return True
 
 
-def _refer_on_host(
-    device: Device, rows: _Array, plan: FocusPlan, raw: PhaseHistory, weights: tuple[np.ndarray, np.ndarray],
-    weigher: WeightedSamples, room: Room, budget: Budget,
-) -> bool:  # fmt: skip
+def _refer_on_host(job: Job, rows: _Array, weigher: WeightedSamples) -> bool:
     """The same, made on the host."""
-    rows.host = host_memory.zeros(rows.shape, budget.host / ARRAYS, "spectra along the track")
+    rows.host = host_memory.zeros(rows.shape, job.budget.host / ARRAYS, "spectra along the track")
     largest = 0.0
-    for start in range(0, raw.n_rows, PIECE):
-        stop = min(start + PIECE, raw.n_rows)
-        made, here = referenced(raw, start, stop, plan.center, weights)
-        rows.host[start:stop], largest = made, max(largest, here)
-        if bound_of_held(device, made, (1.0, 1.0), weigher.n_terms, np.complex64) is None:
+    for start in range(0, job.raw.n_rows, PIECE):
+        stop = min(start + PIECE, job.raw.n_rows)
+        samples, modulus = referenced(job, start, stop)
+        rows.host[start:stop], largest = samples, max(largest, modulus)
+        if bound_of_held(job.device, samples, (1.0, 1.0), weigher.n_terms, np.complex64) is None:
             return False
     check_digits(largest)
     return True
@@ -215,10 +225,8 @@ class _Migration:
         values = np.ones(1, np.float32) if window is None else window.weights.astype(np.float32)
         self._window = device.copied(values)
         first, step = (0.0, 1.0) if window is None else (window.sines[0], window.sines[1] - window.sines[0])
-        self._band = {
-            "low": plan.band.low, "high": plan.band.high, "taper": plan.band.taper, "window_first": first,
-            "window_step": step, "n_window": len(values),
-        }  # fmt: skip
+        self._band = {name: getattr(plan.band, name) for name in ("low", "high", "taper")}
+        self._band |= {"window_first": first, "window_step": step, "n_window": len(values)}
         # the part of the amplitude that depends on the slant range alone; its phase of 1/8 cycle is in the lines
         level = np.abs(bins.level(plan.ranges))
         self._shares = [device.copied((share * level).astype(np.float32)) for share in bins.shares()]
@@ -234,82 +242,67 @@ class _Migration:
         at_once, period = min(self.room.bins, len(plan.bins)), folded.shape[0]
         self._batches.reserve(at_once)
         free = [device.empty(8 * at_once * self._stride) for _ in bins.near(0)]
-        made: dict[int, Any] = {}  # profiles of the nodes about a block
+        profiles_of: dict[int, Buffer] = {}  # profiles of the nodes about a block
         chosen = spectra.buffer if spectra.resident else device.empty(8 * at_once * spectra.shape[1])
         out = folded.buffer if folded.resident else device.empty(8 * at_once * folded.shape[1])
         with Pipeline(device) as pipeline:
             for start in range(0, len(plan.bins), at_once):
                 numbers = plan.bins[start : start + at_once]
                 doppler = numbers / (plan.length * bins.track.step)
-                given = chosen, int(numbers[0] % plan.length), plan.length
-                to = int(numbers[0] % period), period
+                read = _Rows(chosen, int(numbers[0] % plan.length), plan.length)
+                written = _Rows(out, int(numbers[0] % period), period)
                 if not spectra.resident:
                     device.write(chosen, spectra.host[numbers % plan.length])
-                    given = chosen, 0, len(numbers)
+                    read = _Rows(chosen, 0, len(numbers))
                 if not folded.resident:
-                    to = 0, len(numbers)
-                free += made.values()
-                made.clear()
+                    written = _Rows(out, 0, len(numbers), is_new=True)
+                free += profiles_of.values()
+                profiles_of.clear()
                 for i, block in enumerate(blocks):
                     pipeline.new_block()
                     near = bins.near(i)
-                    free += [made.pop(k) for k in [*made] if k not in near]
+                    free += [profiles_of.pop(k) for k in [*profiles_of] if k not in near]
                     for k in near:
-                        if k not in made:
-                            made[k] = free.pop()
-                            self._profiles(pipeline, given, doppler, bins.nodes[k], made[k])
-                    profiles = [made[k] for k in near]
-                    self._add(pipeline, profiles, doppler, block, (out, *to), not folded.resident)
+                        if k not in profiles_of:
+                            profiles_of[k] = free.pop()
+                            self._profiles(pipeline, read, doppler, bins.nodes[k], profiles_of[k])
+                    profiles = [profiles_of[k] for k in near]
+                    self._add(pipeline, profiles, doppler, block, written)
                     done = (start + len(numbers) * (i + 1) / len(blocks)) / len(plan.bins)
                     pipeline.step(lambda done=done: on_progress(done))  # type: ignore[misc]
                 if not folded.resident:
                     part = np.empty((len(numbers), folded.shape[1]), np.complex64)
                     folded.host[numbers % period] += device.download(out, part)
 
-    def _profiles(
-        self, pipeline: Pipeline, given: tuple[Any, int, int], doppler: np.ndarray, distance: float, out: Any
-    ) -> None:  # fmt: skip
-        """Range profiles after the secondary range compression of one slant range, m, of spectra that are `given`."""
-        device, bins, n = self.device, self.bins, len(doppler)
-        spectra, first, period = given
+    def _profiles(self, pipeline: Pipeline, spectra: _Rows, doppler: np.ndarray, distance: float, out: Buffer) -> None:
+        """Range profiles after the secondary range compression of one slant range, m."""
+        device, bins, length = self.device, self.bins, self.plan.profile_length
         bend = bins.bend(doppler, distance)
         kept = np.abs(bend) < EVANESCENT * bins.frequencies.min()
         bends = pipeline.upload(np.concatenate([float_pairs.wide(bend), kept[None].astype(np.float32)]))
         center, delay = (float_pairs.wide(np.array(v)) for v in (bins.center, 2 / SPEED_OF_LIGHT * distance))
-        length = self.plan.profile_length
-        for start, count, work in self._batches.of(n):
-            device.run(
-                self._compress, (length, count), None,
-                launch_numbers(
-                    "compression_filter.cl", "compress", n_samples=len(bins.frequencies), first=first, period=period,
-                    n_bins=n, begin=start, center=center, delay=delay, **self._band,
-                ),
-                spectra, self._frequencies, self._factors, bends, self._window, work,
-            )  # fmt: skip
+        numbers = self._band | {"n_samples": len(bins.frequencies), "n_bins": len(doppler)}
+        numbers |= {"first": spectra.first, "period": spectra.period}
+        for start, count, work in self._batches.of(len(doppler)):
+            numbers |= {"begin": start, "center": center, "delay": delay}
+            launch = launch_numbers("compression_filter.cl", "compress", **numbers)
+            buffers = spectra.buffer, self._frequencies, self._factors, bends, self._window, work
+            device.run(self._compress, (length, count), None, launch, *buffers)
             self._batches.transform()
             device.run(self._pad, (self._stride, count), None, work, length, bins.pad, start, out)
 
     def _add(
-        self, pipeline: Pipeline, profiles: list[Any], doppler: np.ndarray, block: tuple[int, int],
-        to: tuple[Any, int, int], anew: bool,
-    ) -> None:  # fmt: skip
-        """Add profiles, read along the migration and turned, in the columns of a block: each with its shares.
-
-        to    buffer, the first row, and the number after which rows begin again
-        anew  overwrite what is there
-        """
-        device, bins, (begin, end) = self.device, self.bins, block
+        self, pipeline: Pipeline, profiles: list[Buffer], doppler: np.ndarray, block: tuple[int, int], folded: _Rows
+    ) -> None:
+        """Add profiles, read along the migration and turned, in the columns of a block: each with its shares."""
+        bins, (begin, end) = self.bins, block
         cell, line = bins.lines(doppler, self.plan.ranges[begin:end])
         line[..., 2] += np.float32(0.125)
         places = pipeline.upload(cell), pipeline.upload(line)
-        buffer, first, period = to
+        numbers = {"stride": self._stride, "origin": bins.pad + self.plan.profile_length // 2, "begin": begin}
+        numbers |= {"first": folded.first, "period": folded.period, "n_ranges": len(self.plan.ranges)}
         for number, (profile, share) in enumerate(zip(profiles, self._shares, strict=True)):
-            device.run(
-                self._straighten, (end - begin, len(doppler)), None,
-                launch_numbers(
-                    "range_doppler.cl", "straighten_onto", stride=self._stride,
-                    origin=bins.pad + self.plan.profile_length // 2, begin=begin, first=first, period=period,
-                    n_ranges=len(self.plan.ranges), add=not anew or number > 0,
-                ),
-                profile, *places, bins.table, share, buffer,
-            )  # fmt: skip
+            has_values = not folded.is_new or number > 0
+            launch = launch_numbers("range_doppler.cl", "straighten_onto", **numbers, add=has_values)
+            buffers = profile, *places, bins.table, share, folded.buffer
+            self.device.run(self._straighten, (end - begin, len(doppler)), None, launch, *buffers)

@@ -5,8 +5,6 @@ gain(u, r) = sum_n w_n sum_p w_p b(s_p(u, r)),    b: the weight of the Doppler b
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from ._doppler import sine
@@ -16,7 +14,9 @@ from ._track import Track
 COLUMNS = 65  # slant ranges at which sums are made; they are linear between: apertures grow as the slant range does
 
 
-def gain_of(plan: FocusPlan, track: Track, sample_weight: np.ndarray, row_weight: np.ndarray, faintest: float) -> Any:
+def gain_of(
+    plan: FocusPlan, track: Track, sample_weight: np.ndarray, row_weight: np.ndarray, faintest: float
+) -> float | np.ndarray:
     """The gain: a number where it is the same in all pixels to 1e-6, else float32 (times, ranges).
 
     faintest  of the largest gain: pixels of less count as seen by no row
@@ -44,7 +44,7 @@ def gain_of(plan: FocusPlan, track: Track, sample_weight: np.ndarray, row_weight
     before = np.minimum(position.astype(int), max(len(chosen) - 2, 0))
     after, share = np.minimum(before + 1, len(chosen) - 1), position - before
     for first in range(0, n_times, 256):  # in blocks: a large image is not held in float64
-        some = sums[first : first + 256]
-        out[first : first + 256] = some[:, before] * (1 - share) + some[:, after] * share
+        block = sums[first : first + 256]
+        out[first : first + 256] = block[:, before] * (1 - share) + block[:, after] * share
     out[out < faintest * largest] = 0
     return out

@@ -18,7 +18,7 @@ from ...earth.elevation import ElevationModel
 from ._track import REMEDY, Track
 
 UP = np.array([0.0, 0.0, 1.0])
-HIGHEST = 1e8  # m, of heights above the ellipsoid, or above the plane z = 0
+HIGHEST = 1e8  # m, largest height above the ellipsoid, or above the plane z = 0
 NODES = 10, 24  # times and ranges at which smooth Earth-fixed positions are solved; in between, Chebyshev polynomials
 
 
@@ -81,21 +81,21 @@ class Ground:
         if isinstance(self.heights, ElevationModel) or few:
             return self._earth_fixed(times, ranges)
         t, r = (_nodes(axis, n) for axis, n in ((times, NODES[0]), (ranges, NODES[1])))
-        made = self._earth_fixed(t, r)
+        nodes = self._earth_fixed(t, r)
         x, y = ((2 * axis - axis[0] - axis[-1]) / (axis[-1] - axis[0]) for axis in (times, ranges))
         (cx, cy) = ((2 * node - axis[0] - axis[-1]) / (axis[-1] - axis[0]) for node, axis in ((t, times), (r, ranges)))
         rows = chebyshev.chebvander(x, len(t) - 1) @ np.linalg.inv(chebyshev.chebvander(cx, len(t) - 1))
         columns = chebyshev.chebvander(y, len(r) - 1) @ np.linalg.inv(chebyshev.chebvander(cy, len(r) - 1))
-        middle = made.mean(axis=(0, 1))
-        return np.asarray(np.einsum("ia,abx,jb->ijx", rows, made - middle, columns, optimize=True) + middle)
+        middle = nodes.mean(axis=(0, 1))
+        return np.asarray(np.einsum("ia,abx,jb->ijx", rows, nodes - middle, columns, optimize=True) + middle)
 
     def _earth_fixed(self, times: np.ndarray, ranges: np.ndarray) -> np.ndarray:
         p, v = (np.repeat(a, len(ranges), axis=0) for a in self.track.states(times))
         r = np.tile(ranges, len(times))
         model = isinstance(self.heights, ElevationModel)
         levels = self.heights if model else np.full(len(r), self.heights)
-        found = zero_doppler.geolocate(p, v, r, levels, self.sign)  # type: ignore[arg-type]
-        return found.reshape(len(times), len(ranges), 3)
+        positions = zero_doppler.geolocate(p, v, r, levels, self.sign)  # type: ignore[arg-type]
+        return positions.reshape(len(times), len(ranges), 3)
 
     def _local(self, times: np.ndarray, ranges: np.ndarray) -> np.ndarray:
         p, v = self.track.states(times)

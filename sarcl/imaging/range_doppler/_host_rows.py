@@ -9,6 +9,9 @@ import numpy as np
 from ...base.constants import SPEED_OF_LIGHT
 from ...model.phase_history import PhaseHistory
 from ...numerics import range_profiles
+from ...opencl.device import Device
+from ._plan import FocusPlan
+from ._track import Track
 
 ARRAYS = 3  # large arrays that share the memory of the host: rows, spectra, compressed bins
 
@@ -21,6 +24,18 @@ class Budget:
     host: float
 
 
+@dataclass(frozen=True, eq=False)
+class Job:
+    """Echoes that a plan focuses on a device; weights  of samples (n_samples,) and of rows (n_rows,)."""
+
+    device: Device
+    plan: FocusPlan
+    raw: PhaseHistory
+    track: Track
+    weights: tuple[np.ndarray, np.ndarray]
+    budget: Budget
+
+
 def turns(raw: PhaseHistory, start: int, stop: int, center: float) -> tuple[np.ndarray, np.ndarray]:
     """Cycles, less whole ones, that give rows start ... stop - 1 the reference range `center`, m.
 
@@ -30,11 +45,9 @@ def turns(raw: PhaseHistory, start: int, stop: int, center: float) -> tuple[np.n
     return (moved * raw.frequency[0] % 1).astype(np.float64), (moved * raw.frequency_step[0] % 1).astype(np.float64)
 
 
-def referenced(
-    raw: PhaseHistory, start: int, stop: int, center: float, weights: tuple[np.ndarray, np.ndarray]
-) -> tuple[np.ndarray, float]:
-    """Weighted rows start ... stop - 1 with the reference range `center`, m: complex64; and their largest modulus."""
-    sample_weight, row_weight = weights
+def referenced(job: Job, start: int, stop: int) -> tuple[np.ndarray, float]:
+    """Weighted rows start ... stop - 1 with the plan's reference range: complex64; and their largest modulus."""
+    raw, (sample_weight, row_weight) = job.raw, job.weights
     samples = raw.read(start, stop) * np.outer(row_weight[start:stop], sample_weight).astype(np.float32)
     largest = float(np.abs(samples).max(initial=0.0))
     if largest > range_profiles.LARGEST[np.complex64] / (raw.n_rows * raw.n_samples):
@@ -42,7 +55,7 @@ def referenced(
             f"samples times weights reach {largest:.1e}; sums of {raw.n_rows * raw.n_samples} in complex64 hold up to "
             f"{range_profiles.LARGEST[np.complex64]:.0e}: scale the samples down"
         )
-    first, step = (cycles[:, None] for cycles in turns(raw, start, stop, center))
+    first, step = (cycles[:, None] for cycles in turns(raw, start, stop, job.plan.center))
     # n = width a + b: exp(j 2 pi n s) is a product of one power for each digit, which takes far fewer exponentials
     width = int(np.ceil(np.sqrt(raw.n_samples)))
     high = np.exp(2j * np.pi * (first + step * width * np.arange(-(-raw.n_samples // width)))).astype(np.complex64)

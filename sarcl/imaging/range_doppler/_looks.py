@@ -15,13 +15,14 @@ from ...model.phase_history import PhaseHistory
 from ...opencl.device import Device
 from ._doppler import sine
 from ._extent import Extent
-from ._focus import Budget, focus
+from ._focus import focus
+from ._host_rows import Budget, Job
 from ._map_drift import Looks
 from ._plan import FocusPlan, make_plan
 from ._track import Track
 from ._velocity import Hyperbolas
 
-TOLERANCE = 0.1  # of the looks: the displacement of intensities does not need more
+TOLERANCE = 0.1  # tolerance of the looks: the displacement of intensities does not need more
 MOST_PIXELS = 2048, 512  # rows and columns of the looks, from the middle of the image
 
 
@@ -66,16 +67,15 @@ class TwoLooks:
             distance = np.array(extent.ranges.mean())
             first, second = (float(sine(np.array(extent.middle_time), distance, np.array(t), speed)) for t in when)
             middles = first, second
-        made = [self._intensity(one, row) for one, row in zip(plans, rows, strict=True)]
+        intensities = [self._intensity(one, row) for one, row in zip(plans, rows, strict=True)]
         step = float(extent.times[1] - extent.times[0])
         doppler = 2 * speed / self.wavelength * middles[0], 2 * speed / self.wavelength * middles[1]
-        return Looks(made[0], made[1], extent.ranges, speeds, step, doppler, self.wavelength)
+        return Looks(intensities[0], intensities[1], extent.ranges, speeds, step, doppler, self.wavelength)
 
     def _intensity(self, plan: FocusPlan, rows: np.ndarray) -> np.ndarray:
         """Intensities of one look, float64 (times, ranges) of mean 1."""
-        data = focus(
-            self.device, plan, self.raw, self.track, (self.weights[0], rows), self.budget, Clock(), lambda _: None
-        )
+        job = Job(self.device, plan, self.raw, self.track, (self.weights[0], rows), self.budget)
+        data = focus(job, Clock(), lambda _: None)
         power = np.abs(data).astype(np.float64) ** 2
         return np.asarray(power / np.maximum(power.mean(), 1e-300))
 

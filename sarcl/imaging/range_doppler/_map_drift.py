@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import optimize
 
-BLOCKS = 8  # of slant ranges
+BLOCKS = 8  # blocks of slant ranges
 FINER = 4  # points per row at which correlations are tabulated
 FACTORS = 0.8, 1.25  # smallest and largest v^2/v0^2
 ENOUGH = 6.0  # least peak of the correlation over the median at all lags, in median absolute deviations
@@ -73,13 +73,15 @@ def factor_of(looks: Looks) -> float:
         return displacement(looks, ranges, speeds, factor) / looks.row
 
     table = [np.fft.fftshift(np.fft.irfft(np.pad(x, (0, (FINER - 1) * n)), n=2 * FINER * n)) for x in spectra]
-    at = (np.arange(2 * FINER * n) - FINER * n) / FINER
+    lags_of_table = (np.arange(2 * FINER * n) - FINER * n) / FINER
     span = float(np.abs(lags(FACTORS[0]) - lags(FACTORS[1])).max())
     factors = np.linspace(*FACTORS, int(np.clip(FINER * span, 64, 20_000)))
     moved = np.array([lags(float(f)) for f in factors])
-    totals = sum(np.interp(moved[:, i], at, line) for i, line in enumerate(table))
+    totals = sum(np.interp(moved[:, i], lags_of_table, line) for i, line in enumerate(table))
     best = int(totals.argmax())
-    every = sum(line[np.abs(at) < n / 2] for line in table)  # the looks' likeness at any lag, to compare with
+    every = sum(
+        line[np.abs(lags_of_table) < n / 2] for line in table
+    )  # the looks' likeness at any lag, to compare with
     middle = float(np.median(every))
     if best in (0, len(factors) - 1) or not totals[best] - middle > ENOUGH * np.median(np.abs(every - middle)):
         raise ValueError(
@@ -87,13 +89,13 @@ def factor_of(looks: Looks) -> float:
             f"{FACTORS[0]:g} to {FACTORS[1]:g} of the geometry's rate, as noise or ground without contrast has; give "
             "doppler_rate='geometry', or a number in Hz/s"
         )
-    found = optimize.minimize_scalar(
+    optimum = optimize.minimize_scalar(
         lambda factor: -sum(correlation(x, lag) for x, lag in zip(spectra, lags(factor), strict=True)),
         bounds=(factors[max(best - 2, 0)], factors[min(best + 2, len(factors) - 1)]),
         method="bounded",
         options={"xatol": CLOSE / 4},
     )
-    return float(found.x)
+    return float(optimum.x)
 
 
 def displacement(looks: Looks, ranges: np.ndarray, speeds: np.ndarray, factor: float) -> np.ndarray:

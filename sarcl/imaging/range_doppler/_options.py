@@ -53,8 +53,7 @@ class RangeDopplerOptions(FocusOptions):
         "Positions depend on them, the pixels of a straight track do not",
     )
     side: Literal["left", "right"] | None = option(
-        None,
-        '"left" or "right" of the track, seen from above; None: where the origin is, if the echoes contain it',
+        None, '"left" or "right" of the track, seen from above; None: where the origin is, if the echoes contain it'
     )
     times: Sequence[float] | None = option(
         None,

@@ -34,7 +34,7 @@ CUBIC = 1 / 24  # largest error of a cubic through four nodes, in the first inte
 
 @dataclass(frozen=True, eq=False)
 class FocusPlan:
-    """How an image is made.
+    """Plan of an image.
 
     times, ranges   zero-Doppler times of the rows, s, and slant ranges of the columns, m; times lie step/finer apart
     band            Doppler band, as sines of squint angles
@@ -125,9 +125,15 @@ def curved(frequencies: np.ndarray, center: float, bend: np.ndarray) -> np.ndarr
 
 
 def make_plan(
-    raw: PhaseHistory, track: Track, extent: Extent, fit: Hyperbolas, model_error: float, tolerance: float,
-    near: float = 1.0, whole: float = 1.0,
-) -> FocusPlan:  # fmt: skip
+    raw: PhaseHistory,
+    track: Track,
+    extent: Extent,
+    fit: Hyperbolas,
+    model_error: float,
+    tolerance: float,
+    near: float = 1.0,
+    whole: float = 1.0,
+) -> FocusPlan:
     """The plan for a tolerance; ToleranceUnreachable names the best there is.
 
     model_error  root mean square phase error of the hyperbolas, rad
@@ -157,85 +163,99 @@ def make_plan(
             f"to the direction of flight for range_doppler with frequencies of {frequencies[0] / 1e9:.4g} to "
             f"{frequencies[-1] / 1e9:.4g} GHz; use backproject"
         )
-    phases, error = _phases(frequencies, center, fit, band, ranges, LEAST_PHASE * tolerance)
+    compression = _Compression(frequencies, center, fit, band, ranges)
+    phases, error = compression.phases(LEAST_PHASE * tolerance)
     errors["rounding"] += error
     spare -= error
     interpolator, profile_length, _ = choose_interpolator(
         INTERPOLATION * spare / near, raw.n_samples, float(len(ranges))
     )
     errors["interpolation in range"] = interpolator.error * near
-    speeds = fit.at(ranges)[0]
-    slow, fast = float(speeds.min()), float(speeds.max())
-    blocks, error = _blocks(frequencies, center, fit, band, ranges, COMPRESSION * spare / near, tolerance)
+    blocks, error = compression.blocks(COMPRESSION * spare / near, tolerance)
     errors["secondary range compression"] = error * near
-    low, high = band.ends
-    reach = [delay(low, ranges[-1 if low < 0 else 0], slow if low < 0 else fast),
-             delay(high, ranges[-1 if high > 0 else 0], slow if high > 0 else fast)]  # fmt: skip
-    first, last = times[0] - track.stop, times[-1] - track.start
-    span = max(reach[1] - first, last - reach[0])
-    length = fft.good_length(int(np.ceil(span / track.step)) + 16)
-    doppler = [2 * v * s * f / SPEED_OF_LIGHT for v in (slow, fast) for s in (low, high) for f in frequencies[[0, -1]]]
-    scale = length * track.step
-    bins = np.arange(int(np.floor(min(doppler) * scale)), int(np.ceil(max(doppler) * scale)) + 1)
+    length, bins = _doppler_bins(track, extent, frequencies[[0, -1]], fit.at(ranges)[0])
     return FocusPlan(
-        times, ranges, extent.finer, band, fit, length, bins, blocks, interpolator, profile_length,
-        float(ranges.mean()), phases, errors,
-    )  # fmt: skip
+        times=times,
+        ranges=ranges,
+        finer=extent.finer,
+        band=band,
+        fit=fit,
+        length=length,
+        bins=bins,
+        blocks=blocks,
+        interpolator=interpolator,
+        profile_length=profile_length,
+        center=float(ranges.mean()),
+        phases=phases,
+        errors=errors,
+    )
 
 
-def _blocks(
-    frequencies: np.ndarray,
-    center: float,
-    fit: Hyperbolas,
-    band: Band,
-    ranges: np.ndarray,
-    allowed: float,
-    tolerance: float,
-) -> tuple[tuple[tuple[int, int], ...], float]:
-    """The fewest range blocks whose secondary range compression has an error of at most `allowed`, and that error.
+def _doppler_bins(track: Track, extent: Extent, frequencies: np.ndarray, speeds: np.ndarray) -> tuple[int, np.ndarray]:
+    """Length of the azimuth FFT, and numbers of the Doppler bins; frequencies  at the ends of the band, Hz (2,)."""
+    times, ranges, (low, high) = extent.times, extent.ranges, extent.band.ends
+    slow, fast = float(speeds.min()), float(speeds.max())
+    earliest = delay(low, ranges[-1 if low < 0 else 0], slow if low < 0 else fast)
+    latest = delay(high, ranges[-1 if high > 0 else 0], slow if high > 0 else fast)
+    span = max(latest - (times[0] - track.stop), times[-1] - track.start - earliest)
+    length = fft.good_length(int(np.ceil(span / track.step)) + 16)
+    doppler = [2 * v * s * f / SPEED_OF_LIGHT for v in (slow, fast) for s in (low, high) for f in frequencies]
+    scale = length * track.step
+    return length, np.arange(int(np.floor(min(doppler) * scale)), int(np.ceil(max(doppler) * scale)) + 1)
 
-    One filter has the error psi, the phase at the ends of the band by which the ranges at both ends of the swath differ
-    from its middle; cubics through the filters of the blocks' ends have psi^4/24, psi the largest difference of two.
-    """
-    n = len(ranges)
-    one = QUADRATIC * max(_lacking(frequencies, center, fit, band, ranges[[n // 2, i]]) for i in (0, -1))
-    if one <= allowed:
-        return ((0, n),), one
-    for count in sorted({int(3 * 2 ** (i / 3)) for i in range(20)}):
-        if count >= n:  # blocks of cubics have two columns or more: with one, two of their ends would be the same
-            return tuple((i, i + 1) for i in range(n)), 0.0
-        edges = np.linspace(0, n - 1, count + 1).astype(int)
-        psi = max(_lacking(frequencies, center, fit, band, ranges[list(ends)]) for ends in pairwise(edges))
-        error = FOURTH * CUBIC * psi**4
+
+@dataclass(frozen=True, eq=False)
+class _Compression:
+    """Secondary range compression over a swath; center  of the frequencies, Hz."""
+
+    frequencies: np.ndarray
+    center: float
+    fit: Hyperbolas
+    band: Band
+    ranges: np.ndarray
+
+    def blocks(self, allowed: float, tolerance: float) -> tuple[tuple[tuple[int, int], ...], float]:
+        """The fewest range blocks whose compression has an error of at most `allowed`, and that error.
+
+        One filter has the error psi, the phase at the ends of the band by which the ranges at both ends of the swath
+        differ from its middle; cubics through the filters of the blocks' ends have psi^4/24, psi the largest difference
+        of two.
+        """
+        n = len(self.ranges)
+        error = QUADRATIC * max(self._difference(n // 2, i) for i in (0, n - 1))
         if error <= allowed:
-            edges[-1] = n
-            return tuple((int(a), int(b)) for a, b in pairwise(edges)), error
-    raise ToleranceUnreachable(
-        tolerance, None,
-        "secondary range compression of so wide a swath at this squint",
-        "give ranges=(near, far) of a part of it, or use backproject",
-    )  # fmt: skip
+            return ((0, n),), error
+        for count in sorted({int(3 * 2 ** (i / 3)) for i in range(20)}):
+            if count >= n:  # blocks of cubics have two columns or more: with one, two of their ends would be the same
+                return tuple((i, i + 1) for i in range(n)), 0.0
+            edges = np.linspace(0, n - 1, count + 1).astype(int)
+            psi = max(self._difference(*ends) for ends in pairwise(edges))
+            error = FOURTH * CUBIC * psi**4
+            if error <= allowed:
+                edges[-1] = n
+                return tuple((int(a), int(b)) for a, b in pairwise(edges)), error
+        limit = "secondary range compression of so wide a swath at this squint"
+        remedy = "give ranges=(near, far) of a part of it, or use backproject"
+        raise ToleranceUnreachable(tolerance, None, limit, remedy)
 
+    def phases(self, allowed: float) -> tuple[type[np.float32] | type[np.float64], float]:
+        """The type of the phases, and the error by its rounding.
 
-def _phases(
-    frequencies: np.ndarray, center: float, fit: Hyperbolas, band: Band, ranges: np.ndarray, allowed: float
-) -> tuple[type[np.float32] | type[np.float64], float]:
-    """The type of the phases of the secondary range compression, and the error by its rounding.
+        Far off broadside the phases at the ends of the bands are hundreds of cycles.
+        """
+        bends = np.array(self.band.ends)[:, None] * self.center
+        phase = float(np.abs(curved(self.frequencies[[0, -1]], self.center, bends)).max())
+        phase = phase * 4 * np.pi / SPEED_OF_LIGHT * self.ranges[-1]
+        error = float(np.finfo(np.float32).eps) * phase  # several operations, and the root mean square over the bands
+        return (np.float32, error) if error <= allowed else (np.float64, 0.0)
 
-    Far off broadside the phases at the ends of the bands are hundreds of cycles.
-    """
-    bends = np.array(band.ends)[:, None] * center
-    most = float(np.abs(curved(frequencies[[0, -1]], center, bends)).max()) * 4 * np.pi / SPEED_OF_LIGHT * ranges[-1]
-    error = float(np.finfo(np.float32).eps) * most  # several operations, and the root mean square over the bands
-    return (np.float32, error) if error <= allowed else (np.float64, 0.0)
-
-
-def _lacking(frequencies: np.ndarray, center: float, fit: Hyperbolas, band: Band, ranges: np.ndarray) -> float:
-    """Largest difference, rad, between the secondary range compressions of two ranges (2,) at the ends of the bands."""
-    speeds = fit.at(ranges)[0]
-    bends = np.array(band.ends)[:, None] * center
-    phases = [
-        4 * np.pi / SPEED_OF_LIGHT * r * curved(frequencies[[0, -1]], center, bends * speeds[0] / v)
-        for r, v in zip(ranges, speeds, strict=True)
-    ]
-    return float(np.abs(phases[1] - phases[0]).max())
+    def _difference(self, *columns: int) -> float:
+        """Largest difference, rad, between the compressions of two columns at the ends of the bands."""
+        ranges = self.ranges[list(columns)]
+        speeds = self.fit.at(ranges)[0]
+        bends = np.array(self.band.ends)[:, None] * self.center
+        phases = [
+            4 * np.pi / SPEED_OF_LIGHT * r * curved(self.frequencies[[0, -1]], self.center, bends * speeds[0] / v)
+            for r, v in zip(ranges, speeds, strict=True)
+        ]
+        return float(np.abs(phases[1] - phases[0]).max())

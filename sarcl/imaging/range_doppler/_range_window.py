@@ -1,4 +1,4 @@
-"""Which slant ranges lie in the range window of every row that contributes to them."""
+"""Slant ranges that lie in the range window of every row that contributes to them."""
 
 from __future__ import annotations
 
@@ -70,8 +70,8 @@ class RangeWindow:
                 f"ranges start at {asked[0]:.9g} m, but the ground is {self.least:.9g} m from the track; give a larger "
                 "near range"
             )
-        excess, held = self._held(np.linspace(*asked, 9), times)
-        if not held.all():
+        excess, is_held = self._held(np.linspace(*asked, 9), times)
+        if not is_held.all():
             raise ValueError(
                 f"the range window, +-{self.half:.5g} m about the reference ranges, is too small for slant ranges "
                 f"{asked[0]:.9g} to {asked[1]:.9g} m: with their migration they reach {np.abs(excess).max():.5g} m "
@@ -83,8 +83,8 @@ class RangeWindow:
         """First and last index of the longest run of ranges that are held, the ranges, and their excess."""
         low = max(self.least, self.about - 2 * self.half)
         candidates = np.linspace(low, max(low, self.about) + 2 * self.half, RANGES)
-        excess, held = self._held(candidates, times)
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], held.astype(int), [0]])))
+        excess, is_held = self._held(candidates, times)
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], is_held.astype(int), [0]])))
         if len(edges) == 0:
             return 0, -1, candidates, excess
         longest = 2 * int(np.argmax(edges[1::2] - edges[::2]))
@@ -100,5 +100,5 @@ class RangeWindow:
             fit = hyperbolas(self.raw, self.track, self.positions, float(u[1]), ranges[0], ranges[-1], every)
         excess = fit.range(u[:, None, None], ranges, t[:, None]) - self.raw.reference_range[rows][:, None]
         s = sine(u[:, None, None], ranges, t[:, None], self.speed)
-        held = (np.abs(excess) <= self.half) | (s < self.sines[0]) | (s > self.sines[1])
-        return excess, held.all(axis=(0, 1))
+        is_held = (np.abs(excess) <= self.half) | (s < self.sines[0]) | (s > self.sines[1])
+        return excess, is_held.all(axis=(0, 1))

@@ -17,9 +17,9 @@ from ...opencl.choose_device import open_device
 from ...opencl.device import Device
 from ..focusing_task import weigh
 from ._doppler import centroid_of_data, centroid_of_geometry, sine
-from ._extent import Extent, choose_extent
-from ._focus import Budget
+from ._extent import Extent, View, choose_extent
 from ._ground import Ground
+from ._host_rows import Budget
 from ._looks import TwoLooks
 from ._map_drift import converged
 from ._options import RangeDopplerOptions
@@ -35,7 +35,7 @@ EDGES = 0.25  # share of the tolerance for the ends of the Doppler band
 
 @dataclass(frozen=True, eq=False)
 class RangeDopplerTask:
-    """What is to be focused, and how.
+    """One image to be focused, with its plan.
 
     sample_weight, row_weight   of samples (n_samples,) and rows (n_rows,);  budget  bytes
     speed      effective velocity, m/s, to which the centroids refer;  wavelength  of sample n_samples//2, m
@@ -61,7 +61,7 @@ class RangeDopplerTask:
 
     @property
     def beyond_beam(self) -> float:
-        """What a point in the middle of the image lacks, dB, if no echo of it comes from beyond the beam; 0 or less.
+        """Level that a point in the middle of the image has, dB, if no echo comes from beyond the beam; 0 or less.
 
         The tapers of a beam without a window lie beyond it, and rows there count in the gain.
         """
@@ -114,34 +114,41 @@ def range_doppler_task(raw: PhaseHistory, options: RangeDopplerOptions) -> Range
         min(memory_budget.budget(opened, options.max_bytes), opened.info.memory),
         host_memory.installed() / 2 if options.max_bytes is None else float(options.max_bytes),
     )
-    epoch, times = track.epoch, options.times
-    extent = choose_extent(
-        raw, track, smooth, options, speed=speed, centroid=centroids[1], least=least, allowed=EDGES * tolerance,
-        times=None if times is None else (times[0] - epoch, times[1] - epoch),
-    )  # fmt: skip
+    view = View(raw, track, smooth, speed, centroids[1], least)
+    extent = choose_extent(view, options, EDGES * tolerance)
     window = options.window if extent.band.window is None else (windows.both(options.window)[0], None)
-    sample_weight, row_weight = weigh(raw, window, options.weights)
-    known = hyperbolas(
-        raw, track, smooth, extent.middle_time, extent.ranges[0], extent.ranges[-1],
-        extent.rows_of(extent.middle_time),
-    )  # fmt: skip
+    weights = weigh(raw, window, options.weights)
+    rows, (near, far) = extent.rows_of(extent.middle_time), extent.ranges[[0, -1]]
+    of_geometry = hyperbolas(raw, track, smooth, extent.middle_time, near, far, rows)
     n_times, n_ranges = TRIED_ON_TERRAIN if isinstance(heights, ElevationModel) else TRIED
     tried = np.linspace(extent.times[0], extent.times[-1], n_times)
-    model_error, worst = phase_error(raw, track, ground.positions, known, tried, extent.rows_of, n_ranges)
-    fit = known
+    model_error, worst = phase_error(raw, track, ground.positions, of_geometry, tried, extent.rows_of, n_ranges)
+    fit = of_geometry
     if options.doppler_rate == "data":
-        looks = TwoLooks(opened, raw, track, extent, known, (sample_weight, row_weight), budget, wavelength)
-        fit = known.scaled(converged(looks.focused))
+        looks = TwoLooks(opened, raw, track, extent, of_geometry, weights, budget, wavelength)
+        fit = of_geometry.scaled(converged(looks.focused))
     elif isinstance(options.doppler_rate, float):
         middle, along = float(extent.ranges.mean()), centroids[1] * speed
-        fit = known.scaled(factor_of_rate(options.doppler_rate, known, middle, along, wavelength))
-    energy = uneven_energy(raw, track, extent, fit, sample_weight, row_weight, wavelength)
+        fit = of_geometry.scaled(factor_of_rate(options.doppler_rate, of_geometry, middle, along, wavelength))
+    energy = uneven_energy(raw, track, extent, fit, weights, wavelength)
     extent = _with_wide_ends(extent, energy, EDGES * tolerance)
     plan = make_plan(raw, track, extent, fit, model_error, tolerance, energy.near, energy.whole)
     return RangeDopplerTask(
-        tolerance, track, ground, extent, plan, sample_weight, row_weight, opened, budget, speed, centroids,
-        known, wavelength, worst,
-    )  # fmt: skip
+        tolerance=tolerance,
+        track=track,
+        ground=ground,
+        extent=extent,
+        plan=plan,
+        sample_weight=weights[0],
+        row_weight=weights[1],
+        device=opened,
+        budget=budget,
+        speed=speed,
+        centroids=centroids,
+        known=of_geometry,
+        wavelength=wavelength,
+        worst=worst,
+    )
 
 
 def _check_echoes(raw: PhaseHistory, options: RangeDopplerOptions) -> None:
@@ -177,11 +184,11 @@ def _with_wide_ends(extent: Extent, energy: UnevenEnergy, allowed: float) -> Ext
     """
     if extent.has_beam:
         return extent
-    asked = allowed
+    error_of_ends = allowed
     for _ in range(TRIED_BANDS):
-        band = extent.band_for(asked)
+        band = extent.band_for(error_of_ends)
         error = max(band.error, energy.error(band, extent.zone, extent.pixel_band))
         if error <= 1.001 * allowed:
             break
-        asked *= 0.8 * allowed / error
+        error_of_ends *= 0.8 * allowed / error
     return replace(extent, band=replace(band, error=error))

@@ -11,8 +11,8 @@ from ...base import wgs84
 from ...base.constants import SPEED_OF_LIGHT
 from ...model.phase_history import PhaseHistory
 
-EVEN = 1e-3  # of a pulse interval: largest deviation of pulse times from even spacing
-FINEST = 1e-3  # of the pulse interval: coarsest resolution of times
+EVEN = 1e-3  # pulse intervals, largest deviation of pulse times from even spacing
+FINEST = 1e-3  # pulse intervals, coarsest resolution of times
 DEGREES = 7  # highest degree of the polynomials of time through the positions
 UP = np.array([0.0, 0.0, 1.0])
 REMEDY = "use backproject, which takes any track"
@@ -49,9 +49,9 @@ class Track:
         _check_resolution(raw.time)
         steps = np.diff(raw.time)
         if not (steps > 0).all():
-            at = int(np.argmin(steps > 0)) + 1
+            i = int(np.argmin(steps > 0)) + 1
             raise ValueError(
-                f"raw.time[{at}] is {raw.time[at]:.9g} s after {raw.time[at - 1]:.9g} s; range_doppler needs one row "
+                f"raw.time[{i}] is {raw.time[i]:.9g} s after {raw.time[i - 1]:.9g} s; range_doppler needs one row "
                 "per pulse in the order of time: take one channel with raw.select(polarization=..., channel=...)"
             )
         step = float(raw.time[-1] - raw.time[0]) / (raw.n_rows - 1)
@@ -71,10 +71,10 @@ class Track:
             if wavenumber * rest <= accuracy:
                 break
         fitted[0] += origin
-        made = cls(0.0, step, raw.n_rows, fitted, degree == 1 and raw.is_monostatic, float(raw.time[0]))
-        if not np.linalg.norm(made.states(np.array([made.stop / 2]))[1]) * step > 0:
+        track = cls(0.0, step, raw.n_rows, fitted, degree == 1 and raw.is_monostatic, float(raw.time[0]))
+        if not np.linalg.norm(track.states(np.array([track.stop / 2]))[1]) * step > 0:
             raise ValueError(f"the antenna rests at {middle[0]}; a synthetic aperture needs a moving one")
-        return made
+        return track
 
     @property
     def times(self) -> np.ndarray:

@@ -52,15 +52,15 @@ class UnevenEnergy:
         that see a pixel within few zones add up in phase where its echo may not, such as beside a point. Along more
         zones they do not, and are those of noise unless energies differ by more than chance.
         """
-        table, wrong, wanted = row_errors(band, zone)
-        weight, errors = np.interp(self.sines, table, np.abs(wanted) ** 2), np.interp(self.sines, table, wrong)
+        table, wrong, exact = row_errors(band, zone)
+        weight, errors = np.interp(self.sines, table, np.abs(exact) ** 2), np.interp(self.sines, table, wrong)
         echo, energy = float((weight * self.power).sum()), np.maximum(self.power, self.about)
         if not echo:
             return 0.0
         if pixel_band < FEW_ZONES * zone:
             return float(np.sqrt(self.each * ((errors * np.sqrt(energy)).sum(axis=0) ** 2).sum() / echo))
-        found, usual = (errors**2 * energy).sum() / echo, (errors**2).sum() / weight.sum()
-        return float(np.sqrt(found)) if found > CHANCE**2 * usual else 0.0
+        variance, usual = (errors**2 * energy).sum() / echo, (errors**2).sum() / weight.sum()
+        return float(np.sqrt(variance)) if variance > CHANCE**2 * usual else 0.0
 
 
 def row_errors(band: Band, zone: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -77,16 +77,24 @@ def row_errors(band: Band, zone: float) -> tuple[np.ndarray, np.ndarray, np.ndar
     sines = (low + high) / 2 + step * (np.arange(n) - (n - 1) / 2)
     length = fft.good_length(n)
     chirp = np.exp(1j * np.pi * np.fft.fftfreq(length, 1 / CELLS) ** 2)
-    made = np.fft.ifft(np.fft.fft(band.weight(sines), length) * chirp)[:n]
-    wanted = band.row_weight(sines, zone)
-    return sines, np.abs(made - wanted), wanted
+    weights = np.fft.ifft(np.fft.fft(band.weight(sines), length) * chirp)[:n]
+    exact = band.row_weight(sines, zone)
+    return sines, np.abs(weights - exact), exact
 
 
 def uneven_energy(
-    raw: PhaseHistory, track: Track, extent: Extent, fit: Hyperbolas, sample_weight: np.ndarray, row_weight: np.ndarray,
+    raw: PhaseHistory,
+    track: Track,
+    extent: Extent,
+    fit: Hyperbolas,
+    weights: tuple[np.ndarray, np.ndarray],
     wavelength: float,
-) -> UnevenEnergy:  # fmt: skip
-    """Profiles at 64 random pixels, in rows spread over the data. Ratios of 1 where no row holds energy."""
+) -> UnevenEnergy:
+    """Profiles at 64 random pixels, in rows spread over the data. Ratios of 1 where no row holds energy.
+
+    weights  of samples (n_samples,) and of rows (n_rows,)
+    """
+    sample_weight, row_weight = weights
     random = np.random.default_rng(0)
     u, r = random.choice(extent.times, PIXELS), random.choice(extent.ranges, PIXELS)
     rows = spread_over(raw.n_rows, max(LEAST_ROWS, SAMPLES // raw.n_samples))
@@ -95,26 +103,26 @@ def uneven_energy(
     sines = sine(u + shift, r, t, speed)
     delays = fit.range(u, r, t) - raw.reference_range[rows, None]
     length = fft.good_length(FINER * raw.n_samples)
-    at = np.rint(delays * (2 * float(raw.frequency_step[0]) * length / SPEED_OF_LIGHT)).astype(np.int64) % length
+    cells = np.rint(delays * (2 * float(raw.frequency_step[0]) * length / SPEED_OF_LIGHT)).astype(np.int64) % length
     weight = np.abs(extent.band.row_weight(sines, fresnel(wavelength, r))) ** 2
-    power, about, energy = np.empty(at.shape), np.empty(at.shape), np.empty(len(rows))
+    power, about, energy = np.empty(cells.shape), np.empty(cells.shape), np.empty(len(rows))
     largest = np.zeros(len(rows))
     for i, row in enumerate(rows.tolist()):
         samples = raw.read(row, row + 1)[0] * (sample_weight * row_weight[row])
         largest[i] = np.abs(samples).max()  # squares must neither overflow nor underflow
         profile = np.abs(np.fft.ifft(samples / (largest[i] or 1.0), length)) ** 2 * length**2
-        power[i], energy[i] = profile[at[i]], profile.mean()
+        power[i], energy[i] = profile[cells[i]], profile.mean()
         sums = np.cumsum(np.concatenate([profile[-ABOUT * FINER :], profile, profile[: ABOUT * FINER + 1]]))
-        about[i] = (sums[at[i] + 2 * ABOUT * FINER] - sums[at[i]]) / (2 * ABOUT * FINER)
+        about[i] = (sums[cells[i] + 2 * ABOUT * FINER] - sums[cells[i]]) / (2 * ABOUT * FINER)
     relative = (largest / (largest.max() or 1.0)) ** 2
     power, about, energy = power * relative[:, None], about * relative[:, None], energy * relative
-    here = float((weight * power).sum())
+    at_pixels = float((weight * power).sum())
     floor = 1e-20 * float((weight * energy[:, None]).sum())  # where every pixel is at an exact null
     if floor == 0:
         return UnevenEnergy(1.0, 1.0, sines, power, about, each)
-    ratios = [float(np.sqrt((weight * e).sum() / max(here, floor))) for e in (about, energy[:, None])]
+    ratios = [float(np.sqrt((weight * e).sum() / max(at_pixels, floor))) for e in (about, energy[:, None])]
     near, whole = (ratio if ratio > CHANCE else 1.0 for ratio in ratios)
     if extent.pixel_band < FEW_ZONES * extent.zone:  # profiles hardly migrate: their errors, too, add up in phase
         together = np.sqrt(weight * about).sum(axis=0) * each
-        near = max(near, float(np.sqrt((together**2).sum() / (each * max(here, floor)))))
+        near = max(near, float(np.sqrt((together**2).sum() / (each * max(at_pixels, floor)))))
     return UnevenEnergy(near, whole, sines, power, about, each)

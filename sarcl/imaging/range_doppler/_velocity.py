@@ -18,7 +18,7 @@ from ...model.phase_history import PhaseHistory
 from ._track import Track
 
 RANGES = 7  # slant ranges at which hyperbolas are fitted
-DEGREE = 4  # of the polynomials of range through their parameters
+DEGREE = 4  # degree of the polynomials of range through their parameters
 MOST_FACTOR = 4.0  # largest ratio of the squares of velocities for a Doppler rate that is given and the geometry's
 MOST_ROWS = 129  # rows from which they are fitted, and their error is measured
 Positions = Callable[[np.ndarray, np.ndarray], np.ndarray]  # m (n, m, 3) of times (n,) and ranges (m,)
@@ -70,7 +70,7 @@ def hyperbolas(
     rows = rows[spread_over(len(rows), MOST_ROWS)]
     t = track.times[rows]
     truth = true_range(raw, rows, points)
-    made = np.empty((RANGES, 3))
+    parameters = np.empty((RANGES, 3))
     for i, r in enumerate(ranges):
         square, offset, shift = track.speed**2, 0.0, 0.0
         scale = float(np.abs(t - u).max())
@@ -86,8 +86,8 @@ def hyperbolas(
                     f"at slant range {r:.7g} m the track's ranges do not grow on both sides of a closest approach: it "
                     "turns about the scene, and there is no Doppler; use backproject, or polar_format"
                 )
-        made[i] = np.sqrt(square), offset, shift
-    return Hyperbolas(near, far, chebyshev.chebfit(nodes, made, DEGREE))
+        parameters[i] = np.sqrt(square), offset, shift
+    return Hyperbolas(near, far, chebyshev.chebfit(nodes, parameters, DEGREE))
 
 
 def effective_speed(raw: PhaseHistory, track: Track, positions: Positions, distance: float) -> float:
@@ -109,7 +109,7 @@ def rate_of(fit: Hyperbolas, distance: float, closing: float, wavelength: float)
 
 def factor_of_rate(rate: float, fit: Hyperbolas, distance: float, closing: float, wavelength: float) -> float:
     """The factor of the squares of velocities that makes `rate_of` equal to `rate`; ValueError where none does."""
-    given = rate_of(fit, distance, closing, wavelength)
+    natural = rate_of(fit, distance, closing, wavelength)
 
     def less(exponent: float) -> float:
         return rate_of(fit.scaled(np.exp(exponent)), distance, closing, wavelength) / rate - 1 if rate else np.inf
@@ -117,7 +117,7 @@ def factor_of_rate(rate: float, fit: Hyperbolas, distance: float, closing: float
     most = np.log(MOST_FACTOR)
     if not less(-most) < 0 < less(most):
         raise ValueError(
-            f"doppler_rate is {rate:.6g} Hz/s, but the geometry has {given:.6g} Hz/s: they differ by more than a "
+            f"doppler_rate is {rate:.6g} Hz/s, but the geometry has {natural:.6g} Hz/s: they differ by more than a "
             f"factor of about {MOST_FACTOR:g}; give a negative rate in Hz/s at the centre frequency"
         )
     return float(np.exp(optimize.brentq(less, -most, most, xtol=1e-12)))

@@ -22,6 +22,7 @@ from ..forecast import speed
 from ._doppler import fresnel, sine
 from ._focus import focus
 from ._gain import gain_of
+from ._host_rows import Job
 from ._options import RangeDopplerOptions
 from ._plan import FocusPlan
 from ._task import RangeDopplerTask, range_doppler_task
@@ -103,8 +104,8 @@ class RangeDopplerPlan:
             if self.options.progress:
                 self.options.progress("range Doppler", round(1000 * share), 1000)
 
-        data = focus(task.device, plan, raw, task.track, weight, task.budget, clock, on_progress)
-        gain = float(task.sample_weight.sum() * task.row_weight.sum())
+        data = focus(Job(task.device, plan, raw, task.track, weight, task.budget), clock, on_progress)
+        gain: float | np.ndarray = float(task.sample_weight.sum() * task.row_weight.sum())
         if task.extent.has_beam:
             gain = gain_of(plan, task.track, *weight, task.tolerance)
             if isinstance(gain, np.ndarray):
@@ -155,6 +156,6 @@ def _measure_error(raw: PhaseHistory, task: RangeDopplerTask, grid: ImageGrid, d
     if plan.fit is not task.known:
         t = track.times[:, None]
         longer = (plan.fit.range(u, r, t) - task.known.range(u, r, t)).T
-    wanted, random = exact(raw, points, task.sample_weight, task.row_weight, wrap=True, share=share, longer=longer)
-    wrong = float(np.linalg.norm(data[index] - wanted))
-    return wrong / max(float(np.linalg.norm(wanted)), random) if wrong else 0.0
+    truth, random = exact(raw, points, task.sample_weight, task.row_weight, wrap=True, share=share, longer=longer)
+    wrong = float(np.linalg.norm(data[index] - truth))
+    return wrong / max(float(np.linalg.norm(truth)), random) if wrong else 0.0

@@ -6,6 +6,7 @@ import json
 from typing import Any
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from ...base.fingerprint import as_bytes, checker, checksum, kernels, leaves
 from ..engine import ImagePlan
@@ -14,7 +15,7 @@ from ..tiling.tiling import Tiling
 
 
 def job(
-    task: FocusingTask, method: str, tolerance: float, plan: ImagePlan, tiling: Tiling, dtype: Any
+    task: FocusingTask, method: str, tolerance: float, plan: ImagePlan, tiling: Tiling, dtype: DTypeLike
 ) -> dict[str, Any]:
     """Everything that the pixels depend on, as text and numbers; arrays, and the samples, as checksums.
 
@@ -28,9 +29,8 @@ def job(
     step = max(1, 2**24 // (raw.n_samples * np.dtype(raw.samples.dtype).itemsize))
     for start in range(0, raw.n_rows, step):
         samples.update(as_bytes(raw.read(start, min(start + step, raw.n_rows))))
-    others = set(task.__dataclass_fields__) - {
-        "raw", "grid", "antennas", "sample_weight", "row_weight", "wrap", "skips",
-    }  # fmt: skip
+    described = {"raw", "grid", "antennas", "sample_weight", "row_weight", "wrap", "skips"}
+    others = set(task.__dataclass_fields__) - described
     return {
         "sarcl": f"{__version__}, kernels {kernels()}",
         "method": method,

@@ -1,17 +1,29 @@
-"""Which device makes which bands of an image: each takes what it can make until all end together."""
+"""Division of the bands of an image among devices: each takes what it can make until all end together."""
 
 from __future__ import annotations
 
 import threading
 import time
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 from ..tiling.tiling import Run, Tiling
 
-SURE = 0.75  # of a share is taken at a time by a device whose speed is known: the rest corrects the division
+SURE = 0.75  # part of its share that a device of known speed takes at a time: the rest corrects the division
 UNSURE = 0.25  # the same for one whose speed was measured with another kernel
-WORTH = 0.25  # of an engine's `least_pixels`: what is left over after UNSURE must be this much to be divided again
-LITTLE = 0.05  # of its share, by which a device may take more to end at a whole band
+WORTH = 0.25  # part of an engine's `least_pixels` that must be left over after UNSURE to be divided again
+LITTLE = 0.05  # part of its share by which a device may take more, to end at a whole band
+
+
+class Worker(NamedTuple):
+    """A device: bands that its blocks may not cross, Engine.least_pixels, and its speed relative to the others'.
+
+    Equal speeds are taken for certain.
+    """
+
+    ends: set[int]
+    least: float
+    rate: float
 
 
 class Shares:
@@ -24,16 +36,19 @@ class Shares:
     """
 
     def __init__(
-        self, tiling: Tiling, todo: list[Run], *, most: float, unit: int, ends: Sequence[set[int]],
-        least: Sequence[float], rates: Sequence[float], now: Callable[[], float] = time.monotonic,
-    ) -> None:  # fmt: skip
-        """most    pixels of a block, at most;  unit  blocks begin at multiples of so many bands if possible
-        ends    for each device: bands that its blocks may not cross
-        least   for each device: Engine.least_pixels
-        rates   for each device: its speed, relative to that of the others; equal ones are taken for certain
-        """
-        self.tiling, self.most, self.unit, self.ends, self.least = tiling, most, unit, ends, least
-        self._left, self._rates, self._now = list(todo), list(rates), now
+        self,
+        tiling: Tiling,
+        todo: list[Run],
+        devices: Sequence[Worker],
+        *,
+        most: float,
+        unit: int,
+        now: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """most  pixels of a block, at most;  unit  blocks begin at multiples of so many bands if possible"""
+        self.tiling, self.most, self.unit, self.devices = tiling, most, unit, devices
+        rates = [device.rate for device in devices]
+        self._left, self._rates, self._now = list(todo), rates, now
         self._alike = min(rates) == max(rates)
         self._taken, self._done, self._busy = ([0.0] * len(rates) for _ in range(3))  # pixels, pixels, s
         self._began: list[float | None] = [None] * len(rates)
@@ -83,35 +98,33 @@ class Shares:
         for done, busy, began in zip(self._done, self._busy, self._began, strict=True):
             seconds = busy + (0.0 if began is None else self._now() - began)
             shown.append(done / seconds if done > 0 and seconds > 0 else None)
-        known = [v / rate for v, rate in zip(shown, self._rates, strict=True) if v is not None]
-        scale = sum(known) / len(known) if known else 1.0
+        scales = [v / rate for v, rate in zip(shown, self._rates, strict=True) if v is not None]
+        scale = sum(scales) / len(scales) if scales else 1.0
         return [rate * scale if v is None else v for v, rate in zip(shown, self._rates, strict=True)]
 
     def _part(self, k: int) -> float:
         """Pixels that device k should take now."""
-        left, speeds = float(sum(self.tiling.count(*run) for run in self._left)), self._speeds()
+        remainder, speeds = float(sum(self.tiling.count(*run) for run in self._left)), self._speeds()
         # seconds from now at which each device is free, and when all end if they share what is left
-        free = {
-            j: (self._taken[j] - self._done[j]) / speeds[j] if j != k else 0.0
-            for j in range(len(speeds)) if self._active[j]
-        }  # fmt: skip
+        active = [j for j in range(len(speeds)) if self._active[j]]
+        free = {j: (self._taken[j] - self._done[j]) / speeds[j] if j != k else 0.0 for j in active}
         work = speed = 0.0
         end = float("inf")
         for j in sorted(free, key=free.__getitem__):
             if free[j] >= end:
                 break
             work, speed = work + speeds[j] * free[j], speed + speeds[j]
-            end = (left + work) / speed
-        share = min(speeds[k] * end, left)
+            end = (remainder + work) / speed
+        share = min(speeds[k] * end, remainder)
         sure = self._alike or self._done[k] > 0
         rest = share * (1 - (SURE if sure else UNSURE))
-        worth = self.least[k] if sure else WORTH * self.least[k]
+        worth = self.devices[k].least if sure else WORTH * self.devices[k].least
         return share - rest if rest >= worth and len(free) > 1 else share
 
     def _block(self, k: int, pixels: float) -> Run | None:
         """About so many pixels from the first band on that is left, or None where that is less than half a block."""
         first, stop = self._left[0]
-        stop = min([e for e in self.ends[k] if e > first] + [stop])
+        stop = min([e for e in self.devices[k].ends if e > first] + [stop])
         size, count = min(pixels, self.most), self.tiling.count
         last = stop
         if count(first, stop) > size:

@@ -6,10 +6,10 @@ import logging
 import math
 import time
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
+from ...base.types import PathLike
 from ...io import formats, output_paths
 from ...io.hdf5 import BLOCK_BYTES
 from ...model import store
@@ -17,7 +17,7 @@ from ...model.image import Image
 from ..choose_method import MethodChoice
 from ..engine import Skipped
 from ..focusing_task import FocusingTask
-from ..tiling.tiling import Run
+from ..tiling.tiling import FlatImage, Run
 from . import _fingerprint
 from .tile_files import TileStore, discard, folder_of, gaps
 
@@ -27,7 +27,7 @@ PERIOD = 1.0  # s: a run that ends sooner writes no tile files
 WORTH = 60.0  # s: a run that fails or is interrupted sooner removes its tile files, unless resume=True
 
 
-def _parts(flat: Any, at: slice, row_bytes: int) -> Iterator[np.ndarray]:
+def _parts(flat: FlatImage, at: slice, row_bytes: int) -> Iterator[np.ndarray]:
     """Rows `at` of ImageOutput.flat or of a BandBuffer, of row_bytes each, some at a time: they may lie in a file."""
     step = max(1, BLOCK_BYTES // row_bytes)
     for start in range(at.start, at.stop, step):
@@ -47,7 +47,7 @@ class Checkpoint:
     """
 
     def __init__(
-        self, path: Any, task: FocusingTask, chosen: MethodChoice, tolerance: float, resume: bool | None
+        self, path: PathLike, task: FocusingTask, chosen: MethodChoice, tolerance: float, resume: bool | None
     ) -> None:
         self.path, self.task, self.chosen, self.tolerance = path, task, chosen, tolerance
         self.folder, self.resume = folder_of(path), resume
@@ -87,7 +87,7 @@ class Checkpoint:
         if self.tiles is not None:
             yield from self.tiles.found(first, last)
 
-    def keep(self, first: int, last: int, flat: Any, skipped: Skipped) -> None:
+    def keep(self, first: int, last: int, flat: FlatImage, skipped: Skipped) -> None:
         """Bands first ... last - 1 are finished in `flat` (ImageOutput.flat, or a BandBuffer of just them)."""
         if self.resume is False:
             return
@@ -95,7 +95,7 @@ class Checkpoint:
         if self.tiles is not None or time.monotonic() - self.begun >= PERIOD:
             self._write(flat)
 
-    def rescue(self, flat: Any) -> None:
+    def rescue(self, flat: FlatImage) -> None:
         """The devices are lost: finished tiles, in `flat`, stay however short the run was."""
         if self.resume is False:
             return
@@ -103,7 +103,7 @@ class Checkpoint:
         if self._waiting:
             self._write(flat)
 
-    def _write(self, flat: Any) -> None:
+    def _write(self, flat: FlatImage) -> None:
         try:
             tiles = self.tiles or self._open()
             for a, b, n in self._waiting:
@@ -111,11 +111,7 @@ class Checkpoint:
         except (OSError, TypeError) as exc:
             if self.resume:
                 raise
-            log.warning(
-                "finished tiles cannot be kept in %s: %s; a killed run would start again",
-                self.folder,
-                exc,
-            )
+            log.warning("finished tiles cannot be kept in %s: %s; a killed run would start again", self.folder, exc)
             self.resume = False
         self._waiting.clear()
 
@@ -127,7 +123,7 @@ class Checkpoint:
     def __enter__(self) -> Checkpoint:
         return self
 
-    def __exit__(self, kind: Any, *_: Any) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         if kind is None or self.tiles is None:
             return
         if self.resume or self._are_lost or not self.fresh or time.monotonic() - self.begun >= WORTH:

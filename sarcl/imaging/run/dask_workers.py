@@ -10,20 +10,21 @@ from __future__ import annotations
 import os
 import secrets
 import threading
-from collections.abc import Callable, Generator
+from collections.abc import Generator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from ...base.stage_timer import Clock
+from ...base.types import LazyRows
 from ...io import sarcl_hdf5
 from ...model.lazy_rows import Picked, Stacked
 from ...numerics.cost_model import DeviceClass
 from ...opencl import memory_budget
 from ...opencl.choose_device import open_device, split_choice
-from ...opencl.device import Device
+from ...opencl.device import Device, DeviceChoice
 from ...opencl.device_list import DeviceInfo
 from ...opencl.failures import DeviceFailed
 from ..choose_method import MethodChoice
@@ -31,19 +32,23 @@ from ..engine import Engine, Skipped
 from ..focusing_task import FocusingTask
 from ..tiling.tiling import Run
 from .image_output import BandBuffer
-from .workers import FinishedBlock, OutputFor, cut
+from .workers import FinishedBlock, Work, cut
 
+if TYPE_CHECKING:
+    from distributed import Client
+
+Devices: TypeAlias = DeviceChoice | Sequence[DeviceChoice] | None  # as `backproject` takes `device`
 BLOCKS_EACH = 4  # blocks per worker, so that no worker waits long for the slowest
 
 
 @dataclass(frozen=True, eq=False)
 class WorkerTask:
-    """What every worker receives once: the task, the plan, the choice of its device, and the memory it may use
+    """Data that every worker receives once: the task, the plan, the choice of its device, and the memory it may use
     there."""
 
     task: FocusingTask
     chosen: MethodChoice
-    device: Any
+    device: Devices
     max_bytes: float | None
     name: str
 
@@ -54,7 +59,7 @@ class DaskWorkers:
     least_pixels = 0.0
 
     def __init__(
-        self, client: Any, task: FocusingTask, chosen: MethodChoice, device: Any, max_bytes: float | None
+        self, client: Client, task: FocusingTask, chosen: MethodChoice, device: Devices, max_bytes: float | None
     ) -> None:
         self.client, self.tiling, self.n_rows = client, chosen.tiling, task.raw.n_rows
         self.places = _places(client)
@@ -63,19 +68,16 @@ class DaskWorkers:
         raw = replace(task.raw, samples=portable(task.raw.samples))
         self.worker_task = WorkerTask(replace(task, raw=raw), chosen, device, max_bytes, secrets.token_hex(8))
 
-    def work(
-        self, todo: list[Run], most: float, unit: int, output_for: OutputFor, clock: Clock,
-        on_progress: Callable[[int], None],
-    ) -> Generator[FinishedBlock, None, None]:  # fmt: skip
+    def focus(self, work: Work) -> Generator[FinishedBlock, None, None]:
         """See WorkerPool; progress is reported block by block."""
         from distributed import as_completed
 
         lost = _losses()
-        pixels = sum(self.tiling.count(*run) for run in todo)
+        most, pixels = work.most, sum(self.tiling.count(*run) for run in work.todo)
         if self.size > 1:
             most = min(most, pixels / (BLOCKS_EACH * self.size))
-        blocks = cut(self.tiling, todo, most, set(), unit)
-        on_progress(0)
+        blocks = cut(self.tiling, work.todo, most, set(), work.unit)
+        work.on_progress(0)
         if not blocks:
             return
         futures: list[Any] = []
@@ -89,11 +91,11 @@ class DaskWorkers:
                 values, skipped, name = future.result()
                 future.release()
                 self.names = sorted({*self.names, name})
-                flat = output_for(first, last)
+                flat = work.output_for(first, last)
                 flat[self.tiling.extent(first, last)] = values
-                clock.lap("backproject")
+                work.clock.lap("backproject")
                 pairs, done = pairs + self.n_rows * self.tiling.count(first, last), done + 1
-                on_progress(pairs)
+                work.on_progress(pairs)
                 yield first, last, flat, skipped
         except lost as exc:
             raise DeviceFailed(
@@ -117,8 +119,8 @@ def _losses() -> tuple[type[BaseException], ...]:
     return CancelledError, KilledWorker, CommClosedError, ClosedClientError
 
 
-def device_class(client: Any, device: Any) -> DeviceClass:
-    """What plans must know of the devices of all workers together. Opens the devices.
+def device_class(client: Client, device: Devices) -> DeviceClass:
+    """Class of the devices of all workers together, for plans. Opens the devices.
 
     ImportError without dask, TypeError for another kind of client, RuntimeError where it has no workers.
     """
@@ -135,7 +137,7 @@ def device_class(client: Any, device: Any) -> DeviceClass:
     return DeviceClass.of(client.gather(infos))
 
 
-def _places(client: Any) -> dict[str, int]:
+def _places(client: Client) -> dict[str, int]:
     """Address of each worker, and its number on its machine, by which it chooses among the devices there."""
     workers = sorted(client.nthreads())
     hosts = [address.rpartition(":")[0] for address in workers]
@@ -145,9 +147,9 @@ def _places(client: Any) -> dict[str, int]:
 class InFile:
     """Rows of an HDF5 dataset, which is opened in the process that reads it."""
 
-    def __init__(self, file: str, name: str, shape: tuple[int, ...], dtype: Any) -> None:
+    def __init__(self, file: str, name: str, shape: tuple[int, ...], dtype: np.dtype) -> None:
         self.file, self.name, self.shape, self.dtype = file, name, shape, dtype
-        self._open: Any = None
+        self._open: LazyRows | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_open": None}
@@ -155,18 +157,20 @@ class InFile:
     def __getitem__(self, rows: slice) -> np.ndarray:
         if self._open is None:
             try:
-                found = sarcl_hdf5.open_rows(self.file, self.name)
+                rows_in_file = sarcl_hdf5.open_rows(self.file, self.name)
             except (OSError, KeyError) as exc:
                 raise OSError(
                     f"{self.file!r} cannot be read here ({exc}); every worker needs it under this name"
                 ) from None
-            if found.shape != self.shape or found.dtype != self.dtype:
-                raise ValueError(f"{self.file!r} is another file here: its {self.name} are {found.shape} {found.dtype}")
-            self._open = found
+            if rows_in_file.shape != self.shape or rows_in_file.dtype != self.dtype:
+                raise ValueError(
+                    f"{self.file!r} is another file here: its {self.name} are {rows_in_file.shape} {rows_in_file.dtype}"
+                )
+            self._open = rows_in_file
         return np.asarray(self._open[rows])
 
 
-def portable(samples: Any) -> Any:
+def portable(samples: LazyRows) -> LazyRows:
     """Samples that another process can read: arrays as they are, datasets by the names of file and dataset."""
     if isinstance(samples, Picked):
         return Picked(portable(samples.source), samples.index)
@@ -181,13 +185,13 @@ _lock = threading.Lock()  # the threads of a worker share one device
 _engine: tuple[str, Engine, Device] | None = None
 
 
-def _open(choice: Any, place: int) -> Device:
+def _open(choice: Devices, place: int) -> Device:
     """In a worker: its device, by the number of the worker on its machine."""
     choices = split_choice(choice)
     return open_device(choices[place % len(choices)])
 
 
-def _info(choice: Any, place: int) -> DeviceInfo:
+def _info(choice: Devices, place: int) -> DeviceInfo:
     """In a worker: what is known of its device."""
     with _lock:
         return _open(choice, place).info

@@ -5,18 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass
-from typing import Any
 
 from ...base.stage_timer import Clock
 from ...opencl.failures import DeviceFailed
 from ..choose_method import MethodChoice
 from ..engine import Skipped
 from ..focusing_task import FocusingTask
-from ..tiling.tiling import Run
+from ..tiling.tiling import FlatImage, Run
 from .checkpoint import Checkpoint
 from .image_output import BandBuffer, ImageOutput
 from .tile_files import gaps
-from .workers import WorkerPool
+from .workers import Work, WorkerPool
 
 MOST_FILES = 64  # blocks per image, where finished tiles are written to files: each block makes one file
 
@@ -55,7 +54,7 @@ class BandFiller:
                 self.progress("backproject", done, total)
                 reported = done
 
-        def output_for(first: int, last: int) -> Any:
+        def output_for(first: int, last: int) -> FlatImage:
             return BandBuffer(tiling, first, last, self.chosen.dtype) if output is None else output.flat
 
         most = float("inf")
@@ -64,8 +63,9 @@ class BandFiller:
         self.clock.lap("files")
         focused = []
         try:
-            with closing(self.workers.work(todo, most, self.chosen.unit, output_for, self.clock, on_progress)) as work:
-                for first, last, flat, missed in work:
+            work = Work(todo, most, self.chosen.unit, output_for, self.clock, on_progress)
+            with closing(self.workers.focus(work)) as blocks:
+                for first, last, flat, missed in blocks:
                     focused.append((first, last))
                     skipped += missed
                     if checkpoint:

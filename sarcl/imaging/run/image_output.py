@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import os
 from contextlib import ExitStack
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from ...base.text import size_text
+from ...base.types import PathLike, WritableArray
 from ...io import formats
 from ...model import store
 from ...model.image import Image
 from ...model.image_grid import ImageGrid
-from ..tiling.tiling import Tiling
+from ..tiling.tiling import FlatImage, Tiling
 
 
 class ImageOutput:
@@ -23,9 +25,16 @@ class ImageOutput:
     flat  where engines write: the rows of a plane, or the points of a list in their order
     """
 
-    def __init__(self, grid: ImageGrid, tiling: Tiling, out: Any, stack: ExitStack, dtype: Any = np.complex64) -> None:
-        self.grid, self.tiling, self.writer = grid, tiling, None
-        self.data: Any
+    def __init__(
+        self,
+        grid: ImageGrid,
+        tiling: Tiling,
+        out: PathLike | WritableArray | None,
+        stack: ExitStack,
+        dtype: DTypeLike = np.complex64,
+    ) -> None:
+        self.grid, self.writer = grid, None
+        self.data: Any  # pixels are also read from it, which a WritableArray need not allow
         if out is None:
             nbytes = float(grid.size * np.dtype(dtype).itemsize)
             try:
@@ -42,21 +51,22 @@ class ImageOutput:
             stack.callback(self.writer.abandon)  # does nothing once finished
             self.data = self.writer.data
         else:
-            _check_array(out)
-            if tuple(out.shape) != tuple(grid.shape) or np.dtype(out.dtype).kind != "c":
-                raise ValueError(f"out has shape {out.shape} and type {out.dtype}, wanted complex of {grid.shape}")
-            if np.dtype(out.dtype).itemsize < np.dtype(dtype).itemsize:
-                raise ValueError(f"out has type {out.dtype}; this tolerance makes {np.dtype(dtype)}; give that")
-            self.data = out
+            array = _writable(out)
+            if tuple(array.shape) != tuple(grid.shape) or np.dtype(array.dtype).kind != "c":
+                raise ValueError(f"out has shape {array.shape} and type {array.dtype}, wanted complex of {grid.shape}")
+            if np.dtype(array.dtype).itemsize < np.dtype(dtype).itemsize:
+                raise ValueError(f"out has type {array.dtype}; this tolerance makes {np.dtype(dtype)}; give that")
+            self.data = array
         # engines write rows of a plane to the image itself; listed points are copied at the end
-        self.flat = self.data if tiling.in_rows else np.empty(grid.size, dtype)
+        self._points = None if tiling.in_rows else np.empty(grid.size, dtype)
+        self.flat: FlatImage = self.data if self._points is None else self._points
 
     def finish(self) -> None:
         """Complete `data`: all pixels have been written to `flat`."""
-        if self.grid.empty is not None:
-            self.flat[self.grid.empty.ravel()] = 0  # where empty cells are not skipped, they were focused
-        if not self.tiling.in_rows:
-            self.data[...] = self.flat.reshape(self.grid.shape)
+        if self._points is not None:
+            if self.grid.empty is not None:
+                self._points[self.grid.empty.ravel()] = 0  # where empty cells are not skipped, they were focused
+            self.data[...] = self._points.reshape(self.grid.shape)
 
     def image(self, job: str | None = None, **fields: Any) -> Image:
         """The finished Image; a file gets its name, and the fingerprint of its job, only now."""
@@ -71,33 +81,33 @@ class BandBuffer:
     """Buffer for the pixels of some bands, indexed like ImageOutput.flat, where there is no memory for the whole
     image."""
 
-    def __init__(self, tiling: Tiling, first: int, last: int, dtype: Any) -> None:
-        at = tiling.extent(first, last)
-        self.start = at.start
-        self.values = np.empty((at.stop - at.start, *tiling.row_shape), dtype)
+    def __init__(self, tiling: Tiling, first: int, last: int, dtype: DTypeLike) -> None:
+        extent = tiling.extent(first, last)
+        self.start = extent.start
+        self.values = np.empty((extent.stop - extent.start, *tiling.row_shape), dtype)
 
     def __getitem__(self, rows: slice) -> np.ndarray:
         return self.values[rows.start - self.start : rows.stop - self.start]
 
-    def __setitem__(self, at: Any, block: np.ndarray) -> None:
+    def __setitem__(self, at: slice | tuple[slice, slice], block: np.ndarray) -> None:
         rows, *rest = at if isinstance(at, tuple) else (at,)
         self.values[(slice(rows.start - self.start, rows.stop - self.start), *rest)] = block
 
 
-def is_path(out: Any) -> bool:
+def is_path(out: object) -> TypeGuard[PathLike]:
     """True for the name of an image's file; ValueError where no format that is written block by block ends so."""
     if not isinstance(out, str) and not hasattr(out, "__fspath__"):
         return False
     name = os.fspath(out)
     among = formats.writing("image", by_blocks=True)
     if not isinstance(name, str) or formats.named(name, among) is None:
-        wanted = formats.suggested(among)
-        raise ValueError(f"out is {name!r}; images are made in HDF5 files: give a name that ends in {wanted}")
+        endings = formats.suggested(among)
+        raise ValueError(f"out is {name!r}; images are made in HDF5 files: give a name that ends in {endings}")
     return True
 
 
-def _check_array(out: Any) -> None:
-    """TypeError unless `out` is an array or a file's dataset, ValueError unless it can be written to."""
+def _writable(out: object) -> WritableArray:
+    """`out`: TypeError unless it is an array or a file's dataset, ValueError unless it can be written to."""
     if not all(hasattr(out, name) for name in ("shape", "dtype", "__setitem__")):
         what = f"{' '.join(repr(out).split()):.40} ({type(out).__name__})"
         raise TypeError(f'out is {what}; wanted None, a complex array of the grid\'s shape, or a path like "image.h5"')
@@ -106,3 +116,4 @@ def _check_array(out: Any) -> None:
         raise ValueError("out is a read-only array; give one that can be written to (a memmap: mode='r+')")
     if file is not None and getattr(file, "mode", "r+") == "r":
         raise ValueError(f"out is a dataset of {file.filename!r}, which is open for reading; open it with mode 'r+'")
+    return out  # type: ignore[return-value]

@@ -20,8 +20,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from ...base.fingerprint import as_bytes, checker
+from ...base.types import PathLike
 from ...io import output_paths
 from ..engine import Skipped
 from ..tiling.tiling import Run, Tiling
@@ -34,7 +36,7 @@ NAME = re.compile(r"bands-(\d+)-(\d+)\.tiles")
 DIGEST = 32  # bytes
 
 
-def folder_of(path: Any) -> Path:
+def folder_of(path: PathLike) -> Path:
     """The folder for the tile files of image `path`."""
     return Path(f"{output_paths.place(path)}.parts")
 
@@ -45,7 +47,7 @@ class TileStore:
     ValueError where the folder belongs to another job, OSError where it cannot be created.
     """
 
-    def __init__(self, folder: Path, job: dict[str, Any], tiling: Tiling, dtype: Any) -> None:
+    def __init__(self, folder: Path, job: dict[str, Any], tiling: Tiling, dtype: DTypeLike) -> None:
         self.folder, self.tiling, self.dtype = folder, tiling, np.dtype(dtype)
         self.mark = mark(job)
         try:
@@ -58,7 +60,7 @@ class TileStore:
 
     def runs(self) -> list[Run]:
         """Runs of bands that have a file, by the names of the files."""
-        return sorted(found for path in _tiles(self.folder) if (found := self._named(path)))
+        return sorted(run for path in _tiles(self.folder) if (run := self._named(path)))
 
     def found(self, first: int, last: int) -> Iterator[tuple[Run, np.ndarray, Skipped]]:
         """Complete files of this job with any of bands first ... last - 1, no band twice: (run, pixels, pairs skipped).
@@ -158,23 +160,23 @@ class TileStore:
         head = json.loads(data[len(MAGIC) + 8 : start])
         if head["job"] != self.mark:
             return None, Skipped(), FOREIGN
-        at = self.tiling.extent(first, last)
+        extent = self.tiling.extent(first, last)
         size = self.tiling.count(first, last) * self.dtype.itemsize
         fits = len(data) - DIGEST - start == size and head["dtype"] == self.dtype.str
         if not fits or (head["first"], head["last"]) != (first, last):
             return None, Skipped(), "does not hold what its name says"
         values = np.frombuffer(data, self.dtype, size // self.dtype.itemsize, start)
-        return values.reshape(at.stop - at.start, *self.tiling.row_shape), Skipped(**head["skipped"]), ""
+        return values.reshape(extent.stop - extent.start, *self.tiling.row_shape), Skipped(**head["skipped"]), ""
 
     def _mark_in(self, path: Path) -> str | None:
         """The fingerprint in the head of a file; None where it cannot be read."""
         try:
             with open(path, "rb") as file:
                 start = file.read(len(MAGIC) + 8)
-                found = json.loads(file.read(min(struct.unpack("<Q", start[len(MAGIC) :])[0], 4096)))["job"]
+                mark = json.loads(file.read(min(struct.unpack("<Q", start[len(MAGIC) :])[0], 4096)))["job"]
         except (OSError, ValueError, KeyError, TypeError, struct.error):
             return None
-        return str(found)
+        return str(mark)
 
 
 FOREIGN = "belongs to another job"
@@ -205,14 +207,14 @@ def share(n_bands: int, i: int, n: int, unit: int = 1) -> Run:
 
 def gaps(runs: list[Run], first: int, last: int) -> list[Run]:
     """Bands first ... last - 1 that are in none of `runs`, in runs."""
-    left = []
+    missing = []
     for a, b in sorted(runs):
         if a > first:
-            left.append((first, min(a, last)))
+            missing.append((first, min(a, last)))
         first = max(first, b)
         if first >= last:
-            return left
-    return [*left, (first, last)] if first < last else left
+            return missing
+    return [*missing, (first, last)] if first < last else missing
 
 
 def _tiles(folder: Path) -> list[Path]:

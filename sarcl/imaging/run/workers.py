@@ -6,20 +6,37 @@ import logging
 import queue
 import threading
 from collections.abc import Callable, Generator
-from typing import Any, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from ...base.stage_timer import Clock
 from ...opencl.failures import DeviceFailed
 from ..engine import Engine, Skipped
-from ..tiling.tiling import Run, Tiling
-from ._shares import Shares
+from ..tiling.tiling import FlatImage, Run, Tiling
+from ._shares import Shares, Worker
 
 log = logging.getLogger(__name__)
 
-FinishedBlock = tuple[int, int, Any, Skipped]  # a run of bands, where its pixels are, and pairs skipped
-OutputFor = Callable[[int, int], Any]  # destination of the pixels of a run of bands: a flat image or a BandBuffer
+FinishedBlock = tuple[int, int, FlatImage, Skipped]  # a run of bands, where its pixels are, and pairs skipped
+OutputFor = Callable[[int, int], FlatImage]  # destination of the pixels of a run of bands: a flat image or a BandBuffer
+
+
+class Work(NamedTuple):
+    """Bands to be focused in blocks.
+
+    todo         runs of bands
+    most         pixels of a block at most, about;  unit  blocks begin at multiples of so many bands if possible
+    output_for   called as output_for(first, last): the destination of a run
+    on_progress  called from the caller's thread with the number of (row, pixel) pairs done so far
+    """
+
+    todo: list[Run]
+    most: float
+    unit: int
+    output_for: OutputFor
+    clock: Clock
+    on_progress: Callable[[int], None]
 
 
 class WorkerPool(Protocol):
@@ -39,15 +56,8 @@ class WorkerPool(Protocol):
     @property
     def least_pixels(self) -> float: ...
 
-    def work(
-        self, todo: list[Run], most: float, unit: int, output_for: OutputFor, clock: Clock,
-        on_progress: Callable[[int], None],
-    ) -> Generator[FinishedBlock, None, None]:  # fmt: skip
-        """Focus the bands of `todo`, in blocks of about `most` pixels at most, which begin at multiples of `unit` bands
-        if possible, each into output_for(first, last); yields each when it is finished, in any order.
-
-        on_progress  called from the caller's thread with the number of (row, pixel) pairs done so far
-        """
+    def focus(self, work: Work) -> Generator[FinishedBlock, None, None]:
+        """Focus the bands in blocks; yields each block when it is finished, in any order."""
         ...
 
 
@@ -78,49 +88,35 @@ class LocalWorkers:
         self.size, self.rates = len(engines), rates
         self.least_pixels = max(float(engine.least_pixels) for engine in engines)
 
-    def work(
-        self, todo: list[Run], most: float, unit: int, output_for: OutputFor, clock: Clock,
-        on_progress: Callable[[int], None],
-    ) -> Generator[FinishedBlock, None, None]:  # fmt: skip
+    def focus(self, work: Work) -> Generator[FinishedBlock, None, None]:
         """See WorkerPool."""
         each = zip(self.engines, self.budgets, strict=True)
         ends = [{last for _, last in engine.blocks(budget)} for engine, budget in each]
         tiling = self.engines[0].tiling
         if self.size > 1:
-            least = [float(engine.least_pixels) for engine in self.engines]
-            shares = Shares(tiling, todo, most=most, unit=unit, ends=ends, least=least, rates=self.rates)
-            pixels = sum(tiling.count(*run) for run in todo)
-            yield from self._together(shares, pixels, output_for, clock, on_progress)
+            least = [engine.least_pixels for engine in self.engines]
+            devices = [Worker(*each) for each in zip(ends, least, self.rates, strict=True)]
+            shares = Shares(tiling, work.todo, devices, most=work.most, unit=work.unit)
+            yield from self._together(shares, work)
             return
         before = 0
-        on_progress(0)
-        for first, last in cut(tiling, todo, most, ends[0], unit):
-            done, before = self._one(0, first, last, output_for, clock, before, on_progress)
-            on_progress(before)
-            yield done
+        work.on_progress(0)
+        for run in cut(tiling, work.todo, work.most, ends[0], work.unit):
+            block, before = self._one(0, run, work, before)
+            work.on_progress(before)
+            yield block
 
-    def _one(
-        self,
-        k: int,
-        first: int,
-        last: int,
-        output_for: OutputFor,
-        clock: Clock,
-        before: int,
-        on_progress: Callable[[int], None],
-    ) -> tuple[FinishedBlock, int]:
+    def _one(self, k: int, run: Run, work: Work, before: int) -> tuple[FinishedBlock, int]:
         """One block, focused by engine k, and the number of pairs done after it."""
-        flat, pixels = output_for(first, last), self.engines[k].tiling.count(first, last)
+        flat, pixels = work.output_for(*run), self.engines[k].tiling.count(*run)
 
         def rows_done(rows: float) -> None:
-            on_progress(before + int(min(rows, self.n_rows) * pixels))
+            work.on_progress(before + int(min(rows, self.n_rows) * pixels))
 
-        skipped = self.engines[k].fill(first, last, flat, self.budgets[k], clock, rows_done)
-        return (first, last, flat, skipped), before + self.n_rows * pixels
+        skipped = self.engines[k].fill(*run, flat, self.budgets[k], work.clock, rows_done)
+        return (*run, flat, skipped), before + self.n_rows * pixels
 
-    def _together(
-        self, shares: Shares, pixels: int, output_for: OutputFor, clock: Clock, on_progress: Callable[[int], None]
-    ) -> Generator[FinishedBlock, None, None]:
+    def _together(self, shares: Shares, work: Work) -> Generator[FinishedBlock, None, None]:
         """One thread per device; the caller's thread reports progress and yields finished blocks."""
         finished: queue.SimpleQueue[FinishedBlock | BaseException] = queue.SimpleQueue()
         stop = threading.Event()
@@ -134,13 +130,13 @@ class LocalWorkers:
                 pairs[k] = done
                 shares.made(k, done / self.n_rows)
 
-            own_clock, block = Clock(), None
+            own, block = work._replace(clock=Clock(), on_progress=own_progress), None
             try:
                 while not stop.is_set():
                     block, before = shares.take(k), pairs[k]
                     if block is None:
                         return
-                    done, pairs[k] = self._one(k, *block, output_for, own_clock, pairs[k], own_progress)
+                    done, pairs[k] = self._one(k, block, own, pairs[k])
                     finished.put(done)
             except _Stop:
                 pass
@@ -161,23 +157,24 @@ class LocalWorkers:
             thread.start()
             return thread
 
-        on_progress(0)
+        work.on_progress(0)
         threads = {k: started(k) for k in range(self.size)}
         try:
-            tiling, left = self.engines[0].tiling, pixels
-            while left:
+            tiling = self.engines[0].tiling
+            running = sum(tiling.count(*run) for run in work.todo)
+            while running:
                 try:
                     done = finished.get(timeout=0.1)
                 except queue.Empty:
-                    on_progress(sum(pairs))
+                    work.on_progress(sum(pairs))
                     if shares.lost and not any(thread.is_alive() for thread in threads.values()):
                         threads = {k: started(k) for k in alive}  # a block came back after they had ended
                     continue
                 if isinstance(done, BaseException):
                     raise done
-                left -= tiling.count(done[0], done[1])
-                clock.lap("backproject")
-                on_progress(sum(pairs))
+                running -= tiling.count(done[0], done[1])
+                work.clock.lap("backproject")
+                work.on_progress(sum(pairs))
                 yield done
         finally:
             stop.set()

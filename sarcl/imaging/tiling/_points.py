@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -13,14 +13,17 @@ from ...base.morton import morton_order
 from ...model.image_grid import ImageGrid
 from ...numerics.tiles import Tiles, tile_points
 from ...opencl.device import Device
-from .tiling import Orders, Part, Roots, Run, Section, Tiling
+from .tiling import FlatImage, Orders, Part, Roots, Run, Section, Tiling
 from .tree import Tree
+
+if TYPE_CHECKING:
+    from ...opencl.device import Buffer
 
 KEPT = 2**25  # points of a grid whose order is kept, in 4 bytes each
 
 
 class _Curve:
-    """What the tilings of one grid share.
+    """Orders and radii that the tilings of one grid share.
 
     orders  {band: order of its cells that are not empty, int32, along a space-filling curve}
     radii   {side: the largest radius of a tile, m}
@@ -32,12 +35,12 @@ class _Curve:
 
     def order(self, band: int, points: np.ndarray) -> np.ndarray:
         """The order of the points (n, 3) of a band."""
-        found = self.orders.get(band)
-        if found is None:
-            found = morton_order(points).astype(np.int32)
-            if sum(map(len, [*self.orders.values()])) + len(found) <= KEPT:
-                self.orders[band] = found
-        return found
+        order = self.orders.get(band)
+        if order is None:
+            order = morton_order(points).astype(np.int32)
+            if sum(map(len, [*self.orders.values()])) + len(order) <= KEPT:
+                self.orders[band] = order
+        return order
 
 
 _curves: WeakKeyDictionary[ImageGrid, _Curve] = WeakKeyDictionary()
@@ -67,7 +70,7 @@ class PointTiling(Tiling):
         return sum(self._padded(b) for b in range(first, last))
 
     def _empty_in(self, band: int) -> np.ndarray | None:
-        """Which cells of a band are empty, (n,) bool; None: no cell of the grid is."""
+        """Mask of the empty cells of a band, (n,) bool; None: no cell of the grid is."""
         return None if self.empty is None else self.empty[self.extent(band, band + 1)]
 
     def _cells(self, band: int) -> int:
@@ -104,7 +107,7 @@ class PointTiling(Tiling):
         parts = [self._points(b)[order] for b, order in zip(range(first, last), orders, strict=True)]
         return np.concatenate(parts).reshape(-1, self.per_tile, 3)
 
-    def place(self, values: np.ndarray, run: Run, start: int, orders: Orders, flat: Any) -> None:
+    def place(self, values: np.ndarray, run: Run, start: int, orders: Orders, flat: FlatImage) -> None:
         skipped, taken = start * self.per_tile, 0  # values before those given, and those placed
         for band, order in zip(range(*run), orders, strict=True):
             assert order is not None
@@ -149,16 +152,16 @@ class PointTiling(Tiling):
             yield Part(*run, low, min(low + step, roots))
 
     def sections(self, parts: Iterable[Part], factors: Sequence[int]) -> Iterator[Section]:
-        for run, some in itertools.groupby(parts, lambda part: part[:2]):
+        for run, parts_of_run in itertools.groupby(parts, lambda part: part[:2]):
             tiles, orders = self.bands(*run)
             tree, sizes = self._tree(tiles, run, factors), self.tile_sizes(*run)
             line = np.repeat(range(*run), [self.n_roots(b, b + 1, factors[0]) for b in range(*run)])
             roots = Roots(tree.centers[0], line)
-            for part in some:
+            for part in parts_of_run:
                 below = tree.part(part.low, part.high)
                 yield Section(part, below, roots, np.arange(part.low, part.high), sizes[below.slot], orders)
 
-    def place_section(self, device: Device, sums: Any, section: Section, flat: Any) -> None:
+    def place_section(self, device: Device, sums: Buffer, section: Section, flat: FlatImage) -> None:
         slot = section.tree.slot
         self.place_sums(device, sums, section.part[:2], (slot[0], slot[-1] + 1), section.orders, flat)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,8 +13,11 @@ from ...model.image_grid import ImageGrid
 from ...numerics.tiles import Tiles
 from ...opencl.device import Device
 from ...opencl.launch_numbers import launch_numbers
-from .tiling import Orders, Part, Roots, Run, Section, Tiling
+from .tiling import FlatImage, Orders, Part, Roots, Run, Section, Tiling
 from .tree import Tree
+
+if TYPE_CHECKING:
+    from ...opencl.device import Buffer
 
 
 def _power_of_two(n: int) -> int:
@@ -81,26 +84,28 @@ class PlaneTiling(Tiling):
         rows, columns = self.grid.shape  # tiles that reach beyond the grid repeat its last row and column
         i = np.minimum(np.arange(first * self.high, last * self.high), rows - 1)
         j = np.minimum(np.arange(self.across * self.wide), columns - 1)
-        made = self.grid.at(i[:, None], j).reshape(last - first, self.high, self.across, self.wide, 3)
-        return made.transpose(0, 2, 1, 3, 4).reshape(-1, self.per_tile, 3)
+        positions = self.grid.at(i[:, None], j).reshape(last - first, self.high, self.across, self.wide, 3)
+        return positions.transpose(0, 2, 1, 3, 4).reshape(-1, self.per_tile, 3)
 
-    def place(self, values: np.ndarray, run: Run, start: int, orders: Orders, flat: Any) -> None:
+    def place(self, values: np.ndarray, run: Run, start: int, orders: Orders, flat: FlatImage) -> None:
         n_bands, columns, rows = run[1] - run[0], self.grid.shape[1], self.extent(*run)
         across = len(values) // self.per_tile // n_bands
-        left, right = start * self.wide, min((start + across) * self.wide, columns)
+        first_column, right = start * self.wide, min((start + across) * self.wide, columns)
         tiled = values.reshape(n_bands, across, self.high, self.wide).transpose(0, 2, 1, 3)
         block = tiled.reshape(n_bands * self.high, across * self.wide)
-        flat[rows, left:right] = block[: rows.stop - rows.start, : right - left]
+        flat[rows, first_column:right] = block[: rows.stop - rows.start, : right - first_column]
 
     def place_sums(
-        self, device: Device, sums: Any, run: Run, tiles: tuple[int, int], orders: Orders, flat: Any
+        self, device: Device, sums: Buffer, run: Run, tiles: tuple[int, int], orders: Orders, flat: FlatImage
     ) -> None:
         if tiles == (0, (run[1] - run[0]) * self.across):
             self._write(device, sums, run, None, flat)
         else:
             super().place_sums(device, sums, run, tiles, orders, flat)
 
-    def _write(self, device: Device, sums: Any, run: Run, slot: np.ndarray | None, flat: Any, left: int = 0) -> None:
+    def _write(
+        self, device: Device, sums: Buffer, run: Run, slot: np.ndarray | None, flat: FlatImage, left: int = 0
+    ) -> None:
         """Write the rows of a run of bands to the flat image, from compensated sums (4, pixels) on the device.
 
         slot  (tiles,) int: number of each of the sums' tiles among the bands', row by row; None: in that order
@@ -108,22 +113,18 @@ class PlaneTiling(Tiling):
         """
         rows, columns, n_tiles = self.extent(*run), self.grid.shape[1], (run[1] - run[0]) * self.across
         height = rows.stop - rows.start
-        where = np.empty(n_tiles, np.int32)
-        where[np.arange(n_tiles) if slot is None else slot] = np.arange(n_tiles, dtype=np.int32)
-        made, slots = device.empty(8 * height * columns), device.upload(where)
-        device.run(
-            device.kernel("assemble_image.cl", "untile"), (columns, height), None,
-            launch_numbers(
-                "assemble_image.cl", "untile", pixels=n_tiles * self.per_tile, across=self.across, high=self.high,
-                wide=self.wide, columns=columns,
-            ),
-            sums, slots, made,
-        )  # fmt: skip
+        tile_of_slot = np.empty(n_tiles, np.int32)
+        tile_of_slot[np.arange(n_tiles) if slot is None else slot] = np.arange(n_tiles, dtype=np.int32)
+        image, slots = device.empty(8 * height * columns), device.upload(tile_of_slot)
+        numbers = {"pixels": n_tiles * self.per_tile, "across": self.across, "high": self.high, "wide": self.wide}
+        launch = launch_numbers("assemble_image.cl", "untile", **numbers, columns=columns)
+        untile = device.kernel("assemble_image.cl", "untile")
+        device.run(untile, (columns, height), None, launch, sums, slots, image)
         if isinstance(flat, np.ndarray) and flat.dtype == np.complex64 and flat.flags.c_contiguous:
             if flat.shape[1] == columns:
-                device.download(made, flat[rows])
+                device.download(image, flat[rows])
                 return
-        flat[rows, left : left + columns] = device.download(made, np.empty((height, columns), np.complex64))
+        flat[rows, left : left + columns] = device.download(image, np.empty((height, columns), np.complex64))
 
     def outline(self) -> np.ndarray:
         return outline(self.grid)
@@ -181,11 +182,11 @@ class PlaneTiling(Tiling):
             before, lines = lines, (part.first // factor, -(-part.last // factor))
             if lines != before:
                 roots = self._roots(*lines, factor)
-            some = self._columns(part)
-            tree = some.tree(part.first, part.last, factors)
+            columns = self._columns(part)
+            tree = columns.tree(part.first, part.last, factors)
             down, over = np.arange(lines[1] - lines[0]), np.arange(part.low // factor, -(-part.high // factor))
             which = (down[:, None] * wide + over).ravel()
-            yield Section(part, tree, roots, which, some.tile_sizes(part.first, part.last)[tree.slot], ())
+            yield Section(part, tree, roots, which, columns.tile_sizes(part.first, part.last)[tree.slot], ())
 
     def _roots(self, low: int, high: int, factor: int) -> Roots:
         """Roots of lines low ... high - 1."""
@@ -198,12 +199,12 @@ class PlaneTiling(Tiling):
         """The leaves of a part across; the first is the first of a root."""
         if (part.low, part.high) == (0, self.across):
             return self
-        some = copy.copy(self)
-        some.across = part.high - part.low
-        some.grid = self.grid.columns(part.low * self.wide, min(part.high * self.wide, self.grid.shape[1]))
-        return some
+        columns = copy.copy(self)
+        columns.across = part.high - part.low
+        columns.grid = self.grid.columns(part.low * self.wide, min(part.high * self.wide, self.grid.shape[1]))
+        return columns
 
-    def place_section(self, device: Device, sums: Any, section: Section, flat: Any) -> None:
+    def place_section(self, device: Device, sums: Buffer, section: Section, flat: FlatImage) -> None:
         part = section.part
         self._columns(part)._write(device, sums, part[:2], section.tree.slot, flat, part.low * self.wide)
 

@@ -1,11 +1,11 @@
-"""What every tiling offers: bands of tiles, and parts and sections of them for factorised backprojection."""
+"""Base class of tilings: bands of tiles, and parts and sections of them for factorised backprojection."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
@@ -15,12 +15,23 @@ from ...opencl.device import Device
 from ...opencl.launch_numbers import launch_numbers
 from .tree import Tree
 
+if TYPE_CHECKING:
+    from ...opencl.device import Buffer
+
 Run = tuple[int, int]  # bands first ... last - 1
 Orders = Sequence[np.ndarray | None]  # for each band: cell of the band that each point of its tiles is; None: a plane
 
 
+class FlatImage(Protocol):
+    """Rows of a plane, or listed points, in the order of the bands: an array, a dataset of a file, or a BandBuffer."""
+
+    def __getitem__(self, rows: slice, /) -> np.ndarray: ...
+
+    def __setitem__(self, at: slice | tuple[slice, slice], block: np.ndarray, /) -> None: ...
+
+
 class Part(NamedTuple):
-    """What the factorised method makes at a time of bands first ... last - 1.
+    """Part of bands first ... last - 1 that the factorised method makes at a time.
 
     low, high  of a plane: leaves low ... high - 1 across; of listed points: roots low ... high - 1 of these bands
     """
@@ -93,7 +104,7 @@ class Tiling(ABC):
 
     @abstractmethod
     def extent(self, first: int, last: int) -> slice:
-        """Where bands first ... last - 1 lie in the flat image (rows of a plane, or points)."""
+        """Place of bands first ... last - 1 in the flat image (rows of a plane, or points)."""
 
     @abstractmethod
     def pixels(self, first: int, last: int) -> int:
@@ -112,7 +123,7 @@ class Tiling(ABC):
         """Positions, m (n_tiles, per_tile, 3), of bands first ... last - 1: those of the grid to the bit."""
 
     @abstractmethod
-    def place(self, values: np.ndarray, run: Run, start: int, orders: Orders, flat: Any) -> None:
+    def place(self, values: np.ndarray, run: Run, start: int, orders: Orders, flat: FlatImage) -> None:
         """Write values (n,) of tiles from `start` on of a run of bands to their pixels in the flat image.
 
         The tiles are all of the run, or some of a run of one band.
@@ -139,7 +150,7 @@ class Tiling(ABC):
         """Parts with their trees; `factors` as of `tree`."""
 
     @abstractmethod
-    def place_section(self, device: Device, sums: Any, section: Section, flat: Any) -> None:
+    def place_section(self, device: Device, sums: Buffer, section: Section, flat: FlatImage) -> None:
         """Write compensated sums (4, pixels) on the device to the pixels of a section in the flat image."""
 
     @abstractmethod
@@ -177,8 +188,8 @@ class Tiling(ABC):
 
     def count(self, first: int, last: int) -> int:
         """Pixels of bands first ... last - 1, empty cells included, without padding."""
-        at = self.extent(first, last)
-        return int((at.stop - at.start) * np.prod(self.row_shape, dtype=np.int64))
+        extent = self.extent(first, last)
+        return int((extent.stop - extent.start) * np.prod(self.row_shape, dtype=np.int64))
 
     def blocks(self, most: int) -> list[Run]:
         """All bands in runs of `most` pixels, padding included, at most; a band that is alone may be larger."""
@@ -203,7 +214,7 @@ class Tiling(ABC):
         return joined, orders
 
     def place_sums(
-        self, device: Device, sums: Any, run: Run, tiles: tuple[int, int], orders: Orders, flat: Any
+        self, device: Device, sums: Buffer, run: Run, tiles: tuple[int, int], orders: Orders, flat: FlatImage
     ) -> None:
         """Write compensated sums (4, pixels) on the device of tiles start ... stop - 1 of a run, as `place` does."""
         start, stop = tiles
@@ -211,13 +222,13 @@ class Tiling(ABC):
         self.place(download_sums(device, sums, n), run, start, orders, flat)
 
 
-def download_sums(device: Device, sums: Any, n: int, kind: type[np.floating] = np.float32) -> np.ndarray:
+def download_sums(device: Device, sums: Buffer, n: int, kind: type[np.floating] = np.float32) -> np.ndarray:
     """Pixels (n,), complex of twice the bytes of `kind`, from compensated sums (4, n) on the device."""
     if kind == np.float32:  # added up there: half of the bytes are downloaded
-        made, first = device.empty(8 * n), device.upload(np.zeros(1, np.int32))
+        pixels, first = device.empty(8 * n), device.upload(np.zeros(1, np.int32))
         untile = device.kernel("assemble_image.cl", "untile")
         numbers = launch_numbers("assemble_image.cl", "untile", pixels=n, across=1, high=1, wide=n, columns=n)
-        device.run(untile, (n, 1), None, numbers, sums, first, made)
-        return device.download(made, np.empty(n, np.complex64))
+        device.run(untile, (n, 1), None, numbers, sums, first, pixels)
+        return device.download(pixels, np.empty(n, np.complex64))
     real, imaginary, real_rest, imaginary_rest = device.download(sums, np.empty((4, n), kind))
     return np.asarray((real + real_rest) + 1j * (imaginary + imaginary_rest))

@@ -35,7 +35,7 @@ ABOUT = (
     "delay depends on the direction. The dissertation focuses echoes of such arrays. It proposes to backproject them "
     "from apparent positions of the antenna, so that a short aperture would resolve like a longer one. This page "
     "reproduces its figures and tables. Source: " + PAPERS["farooq"] + " (AFIT/DEE/ENG/09-04)."
-)  # fmt: skip
+)
 TERMS = (
     ("FDA, CFA", "Frequency-diverse array: a carrier per element, f0 + n df at element n of N. Constant-frequency "
      "array: one carrier for all elements."),

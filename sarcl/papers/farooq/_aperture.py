@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
-from ...figures import html
 from ..paper import Section
 from ._lab import Lab, decibels, system
 from ._reference import DIAMOND, PRINTED
@@ -37,10 +36,10 @@ def steady(lab: Lab) -> Section:
         y = mapped.tx[:, 1]
         out.number(f"{name}: length", f"figure {figure}", 430.0, float(np.ptp(y)), 0.5, "m", ".1f")
         shift = float((y - actual.tx[:, 1]).mean())
-        wanted = "negative" if step > 0 else "positive"
+        direction = "negative" if step > 0 else "positive"
         if n > 45:
             out.states(
-                f"{name}: places are moved", f"figure {figure}", f"in the {wanted} direction", f"by {shift:+.1f} m",
+                f"{name}: places are moved", f"figure {figure}", f"in the {direction} direction", f"by {shift:+.1f} m",
                 (shift < 0) == (step > 0), value=shift,
                 rule="the mean displacement has that sign",
             )  # fmt: skip
@@ -49,13 +48,14 @@ def steady(lab: Lab) -> Section:
             f"the mapping changes nothing, but the centre frequency is now {case.middle / 1e9:.2f} GHz (section "
             f"5.3.1), whose wave resolves {case.null:.3f} m over 430 m; figure 5.5 wants f0 moved as well"
         )  # fmt: skip
-        out.number(f"{name}: nulls in cross-range", f"figure {figure}", PRINTED, nulls[1], 0.002, "m", why=remark,
-                   cause="error in print")  # fmt: skip
+        item = f"{name}: nulls in cross-range"
+        out.number(item, f"figure {figure}", PRINTED, nulls[1], 0.002, "m", why=remark, cause="error in print")
+        item = f"{name}: nulls before and after the mapping"
+        measured = f"{nulls[0]:.4f} and {nulls[1]:.4f} m"
+        rule = "difference below 2 mm"
         out.states(
-            f"{name}: nulls before and after the mapping", f"figure {figure}", "unchanged",
-            f"{nulls[0]:.4f} and {nulls[1]:.4f} m", abs(nulls[0] - nulls[1]) < 0.002, value=nulls,
-            rule="difference below 2 mm",
-        )  # fmt: skip
+            item, f"figure {figure}", "unchanged", measured, abs(nulls[0] - nulls[1]) < 0.002, value=nulls, rule=rule
+        )
         curves.append((name, actual.tx[::THIN, 1], y[::THIN]))
         if n == 45:
             curves.insert(0, ("actual", actual.tx[::THIN, 1], actual.tx[::THIN, 1]))
@@ -63,11 +63,7 @@ def steady(lab: Lab) -> Section:
             lab.picture(lab.mapped(case, "apparent", DIAMOND), f"{name}, mapped (figure {figure})."),
             lab.picture(mapped, f"{name}: the centre point in a box of 0.167 m (figure {figure}).", ZOOM, PRINTED),
         )
-    out.draw(
-        html.plot(
-            curves, "actual position, m", "position backprojected from, m", "Positions along the track.", dots=True
-        )
-    )
+    out.plot(curves, "actual position, m", "position backprojected from, m", "Positions along the track.", dots=True)
     return out
 
 
@@ -86,38 +82,42 @@ def switched(lab: Lab) -> Section:
             continue
         case, name = system(n, step), f"N {n}, +-{step / 1e6:g} MHz"
         raw = lab.collect(case)
-        found = {o: lab.mapped(case, "apparent", offset=o) for o in ("published", "halved")}
+        mapped = {o: lab.mapped(case, "apparent", offset=o) for o in ("published", "halved")}
         other = system(n, step, spacing=OTHER_SPACING)
         wide = float(np.ptp(lab.mapped(other, "apparent").tx[:, 1]))
-        lengths = {o: float(np.ptp(m.tx[:, 1])) for o, m in found.items()}
-        here = lengths["published"]
-        out.number(f"{name}: apparent length", figure, length, here, 1.0, "m", ".1f")
-        out.number(f"{name}: longer by", figure, growth, 100 * (here / case.aperture - 1), 0.6, "%", ".1f")
-        table.append([name, f"{length:.0f}", f"{here:.1f}", f"{wide:.1f}", f"{lengths['halved']:.1f}"])
+        lengths = {o: float(np.ptp(m.tx[:, 1])) for o, m in mapped.items()}
+        length_by_paper = lengths["published"]
+        out.number(f"{name}: apparent length", figure, length, length_by_paper, 1.0, "m", ".1f")
+        out.number(f"{name}: longer by", figure, growth, 100 * (length_by_paper / case.aperture - 1), 0.6, "%", ".1f")
+        table.append([name, f"{length:.0f}", f"{length_by_paper:.1f}", f"{wide:.1f}", f"{lengths['halved']:.1f}"])
         out.keep(
-            **{name: {"printed": length, "half a wave of fc": here, "d 0.015 m": wide, "halved": lengths["halved"]}}
+            **{
+                name: {
+                    "printed": length,
+                    "half a wave of fc": length_by_paper,
+                    "d 0.015 m": wide,
+                    "halved": lengths["halved"],
+                }
+            }
         )
-        gap = float(np.diff(found["published"].tx[:, 1]).max())
+        gap = float(np.diff(mapped["published"].tx[:, 1]).max())
         if n == 45:
-            out.states(
-                "switched aperture", figure, "no longer continuous", f"gap of {gap:.1f} m", gap > 2 * _step(raw.tx),
-                value=gap,
-                rule="gap above twice the step of the track",
-            )  # fmt: skip
+            expected = "no longer continuous"
+            measured = f"gap of {gap:.1f} m"
+            rule = "gap above twice the step of the track"
+            out.states("switched aperture", figure, expected, measured, gap > 2 * _step(raw.tx), value=gap, rule=rule)
             _outer(out, lab, figure)
             curves.append(("actual", raw.tx[::THIN, 1], raw.tx[::THIN, 1]))
-        curves.append((name, raw.tx[::THIN, 1], found["published"].tx[::THIN, 1]))
+        curves.append((name, raw.tx[::THIN, 1], mapped["published"].tx[::THIN, 1]))
         out.draw(
             lab.picture(lab.mapped(case, "apparent", DIAMOND), f"{name}, mapped ({figure})."),
-            lab.picture(found["published"], f"{name}: the centre point in a box of 0.167 m ({figure}).", ZOOM, PRINTED),
+            lab.picture(
+                mapped["published"], f"{name}: the centre point in a box of 0.167 m ({figure}).", ZOOM, PRINTED
+            ),
         )
     head = ["length, m", "printed", "d 14.36 mm", "d 15 mm", "offset halved"]
-    out.parts.append(html.table(head, table))
-    out.draw(
-        html.plot(
-            curves, "actual position, m", "position backprojected from, m", "Positions along the track.", dots=True
-        )
-    )
+    out.table(head, table)
+    out.plot(curves, "actual position, m", "position backprojected from, m", "Positions along the track.", dots=True)
     return out
 
 
@@ -127,12 +127,11 @@ def _outer(out: Section, lab: Lab, figure: str) -> None:
     inner, outer = (
         lab.measure(lab.mapped(case, "apparent", ((0.0, y, 0.0),)), half=0.9, about=y)["pslr_db"] for y in (0.0, 2.0)
     )
-    out.states(
-        "side lobes of the outer targets", figure, "most noticeable there",
-        f"PSLR {outer:.1f} dB 2 m off the centre, {inner:.1f} dB at it", outer > inner + 1,
-        "points off the centre are measured again below", [outer, inner],
-        rule="PSLR more than 1 dB higher than at the centre",
-    )  # fmt: skip
+    item = "side lobes of the outer targets"
+    measured = f"PSLR {outer:.1f} dB 2 m off the centre, {inner:.1f} dB at it"
+    why = "points off the centre are measured again below"
+    rule = "PSLR more than 1 dB higher than at the centre"
+    out.states(item, figure, "most noticeable there", measured, outer > inner + 1, why, [outer, inner], rule=rule)
 
 
 def nulls(lab: Lab) -> Section:
@@ -144,29 +143,29 @@ def nulls(lab: Lab) -> Section:
             continue
         case, name = system(n, step), f"N {n}, +-{step / 1e6:g} MHz"
         mapped = lab.mapped(case, "apparent")
-        found = lab.measure(mapped)
-        text = f"{found['null']:.3f} m, PSLR {found['pslr_db']:.1f} dB"
-        value = [found["null"], found["pslr_db"]]
+        response = lab.measure(mapped)
+        text = f"{response['null']:.3f} m, PSLR {response['pslr_db']:.1f} dB"
+        value = [response["null"], response["pslr_db"]]
         if expected is None:
-            out.states(f"{name}: nulls", figure, "no difference visible", text, abs(found["null"] - PRINTED) < 0.017,
+            out.states(f"{name}: nulls", figure, "no difference visible", text, abs(response["null"] - PRINTED) < 0.017,
                        "6 % closer to the peak", value,
                 rule="within 17 mm of 0.167 m")  # fmt: skip
         else:
             uniform = SPEED_OF_LIGHT / case.middle * case.distance / (2 * np.ptp(mapped.tx[:, 1]))
             out.states(
                 f"{name}: nulls", f"{figure}, equation 5.36", f"{expected:.3f} m", text,
-                abs(found["null"] - expected) < 0.003,
+                abs(response["null"] - expected) < 0.003,
                 f"an aperture of this length without a gap has {uniform:.3f} m; two halves with a gap are an "
                 "interferometer, whose nulls are closer to the peak and whose side lobes are higher", value,
                 rule="within 3 mm", cause="interpretation",
             )  # fmt: skip
-        at, values = lab.cut(mapped, half=1.0, n=401)
-        curves.append((name, at, decibels(values)))
+        places, values = lab.cut(mapped, half=1.0, n=401)
+        curves.append((name, places, decibels(values)))
     plain = system(45, 20e6, mirrored=False)
-    at, values = lab.cut(lab.mapped(plain, "corrected"), half=1.0, n=401)
-    curves.insert(0, ("not mapped", at, decibels(values)))
+    places, values = lab.cut(lab.mapped(plain, "corrected"), half=1.0, n=401)
+    curves.insert(0, ("not mapped", places, decibels(values)))
     out.say("Cross-range cuts through the centre point. Equation 5.36 assumes that the mapped aperture has no gap.")
-    out.draw(html.plot(curves, "cross-range, m", "dB", "The centre point (figures 5.6 to 5.8)."))
+    out.plot(curves, "cross-range, m", "dB", "The centre point (figures 5.6 to 5.8).")
     return out
 
 

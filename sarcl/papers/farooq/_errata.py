@@ -45,8 +45,10 @@ def section(lab: Lab) -> Section:
     )
     out.parts.append(html.listed(words))
     case = system(45, 20e6)
-    out.number("half a wave of the centre frequency", "section 5.4", 0.14, case.step, 1e-3, "m", ".4f",
-               "a zero is missing: 0.014 m", cause="error in print")  # fmt: skip
+    item = "half a wave of the centre frequency"
+    out.number(
+        item, "section 5.4", 0.14, case.step, 1e-3, "m", ".4f", "a zero is missing: 0.014 m", cause="error in print"
+    )
     sizes = [n * system(n, s).step for n, s in ((9, 100e6), (900, 1e6))]
     out.states(
         "size of 9 and 900 elements", "section 5.4", "0.12 and 12 m", f"{sizes[0]:.2f} and {sizes[1]:.1f} m",
@@ -65,24 +67,21 @@ def _poles(out: Section) -> None:
     u = directions(azimuth, elevation)
     given: dict[str, Any] = {"shape": SHAPE, "spacing": SPACING, "frequency_step": STEPS, "retarded": -TIME}
     right = np.abs(diverse_factor(F0, cosines=(u[..., 1], u[..., 2]), **given)) / 81
-    phase = [
-        2 * np.pi * (STEPS[i] * -TIME + F0 * SPACING[i] * u[..., 1 + i] / SPEED_OF_LIGHT) for i in (0, 1)
-    ]  # fmt: skip
+    phase = [2 * np.pi * (STEPS[i] * -TIME + F0 * SPACING[i] * u[..., 1 + i] / SPEED_OF_LIGHT) for i in (0, 1)]
     swapped = 2 * np.pi * (STEPS[1] * -TIME + F0 * SPACING[1] * u[..., 1] / SPEED_OF_LIGHT)  # kappa_y for kappa_z
     tops = [np.sin(9 * p / 2) for p in phase]
     printed = np.abs(tops[0] / np.sin(phase[0] / 2) * tops[1] / np.sin(swapped / 2)) / 81
     worst = float(np.nanmax(printed))
-    out.states(
-        "largest array factor, over N P", "equations 3.46 and 4.1", "1", f"poles as printed, {worst:.0f} "
-        f"on a grid of 1 deg; {right.max():.3f} mended", worst < 1.01,
-        "a denominator has kappa_y instead of kappa_z", worst,
-        rule="at most 1.01", cause="error in print",
-    )  # fmt: skip
+    item = "largest array factor, over N P"
+    source = "equations 3.46 and 4.1"
+    measured = f"poles as printed, {worst:.0f} on a grid of 1 deg; {right.max():.3f} mended"
+    why = "a denominator has kappa_y instead of kappa_z"
+    out.states(item, source, "1", measured, worst < 1.01, why, worst, rule="at most 1.01", cause="error in print")
     for what, level in (("corrected", right), ("as printed, limited to 1", np.minimum(printed, 1.0))):
-        out.draw(html.picture(
-            decibels(level, -80), (-85.1, 84.9), (-85.1, 84.9), "azimuth, deg",
-            "elevation, deg", f"Equation 4.1 {what}, t' = -250 us.", floor_db=-40,
-        ))  # fmt: skip
+        caption = f"Equation 4.1 {what}, t' = -250 us."
+        out.picture(
+            decibels(level, -80), (-85.1, 84.9), (-85.1, 84.9), "azimuth, deg", "elevation, deg", caption, floor_db=-40
+        )
 
 
 def _mirror(out: Section, lab: Lab) -> None:
@@ -101,14 +100,15 @@ def _mirror(out: Section, lab: Lab) -> None:
 
     printed, mended = -places(1.0), places(-1.0)
     off = [float(np.abs(y - mapped[:, 1]).max()) for y in (printed, mended)]
-    out.states(
-        "places along the track, N 45, 20 MHz", "equation 5.14", "an aperture moved in the negative direction",
-        f"as printed mirrored, up to {off[0]:.0f} m off; mended the same to {1e3 * off[1]:.1g} mm", off[0] < 1.0,
-        "the figures show it right: they were not made with the minus", off,
-        rule="within 1 m of the mapped positions", cause="error in print",
-    )  # fmt: skip
+    item = "places along the track, N 45, 20 MHz"
+    expected = "an aperture moved in the negative direction"
+    measured = f"as printed mirrored, up to {off[0]:.0f} m off; mended the same to {1e3 * off[1]:.1g} mm"
+    why = "the figures show it right: they were not made with the minus"
+    rule = "within 1 m of the mapped positions"
+    out.states(item, "equation 5.14", expected, measured, off[0] < 1.0, why, off, rule=rule, cause="error in print")
     curves = [("actual", actual[:, 1]), ("as printed", printed), ("corrected", mended)]
-    out.draw(html.plot(
-        [(name, actual[::THIN, 1], y[::THIN]) for name, y in curves], "actual position, m",
-        "position backprojected from, m", "Equation 5.14 as printed and corrected, N 45, 20 MHz.", dots=True,
-    ))  # fmt: skip
+    y_name = "position backprojected from, m"
+    caption = "Equation 5.14 as printed and corrected, N 45, 20 MHz."
+    out.plot(
+        [(name, actual[::THIN, 1], y[::THIN]) for name, y in curves], "actual position, m", y_name, caption, dots=True
+    )

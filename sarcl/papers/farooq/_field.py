@@ -7,7 +7,6 @@ import numpy as np
 from ...arrays import array_factor as closed
 from ...arrays.beam import beam
 from ...base.constants import SPEED_OF_LIGHT
-from ...figures import html
 from ...model.antenna_array import AntennaArray
 from ..paper import Section
 from ._lab import Lab, decibels
@@ -37,12 +36,10 @@ def delays(lab: Lab) -> Section:
         curves.append((f"{degrees} deg", 1e9 * t, level))
         exact_curves.append((f"{degrees} deg", 1e9 * t, exact))
         if degrees:
-            found = 1e9 * t[level.argmax()]
+            delay = 1e9 * t[level.argmax()]
             figure = "4.11" if degrees > 0 else "4.12"
-            out.number(
-                f"delay of the peak at {degrees:+d} deg, closed form", f"figure {figure}, equation 4.27",
-                PRINTED * np.sign(degrees), found, 0.004, "ns", "+.4f",
-            )  # fmt: skip
+            item = f"delay of the peak at {degrees:+d} deg, closed form"
+            out.number(item, f"figure {figure}, equation 4.27", PRINTED * np.sign(degrees), delay, 0.004, "ns", "+.4f")
     peak = float(exact_curves[2][2].max())
     bound = closed.quadratic_phase(shape=(N, 1), spacing=(HALF_WAVE, 0), frequency_step=(STEP, 0), cosines=(1, 0))
     out.states(
@@ -53,10 +50,8 @@ def delays(lab: Lab) -> Section:
         rule="above 0.9 N", cause="interpretation",
     )  # fmt: skip
     _systems(out, lab)
-    out.draw(
-        html.plot(curves, "t', ns", "modulus", "Closed form in three directions (figures 4.10 to 4.12)."),
-        html.plot(exact_curves, "t', ns", "modulus", "The exact field in the same directions."),
-    )
+    out.plot(curves, "t', ns", "modulus", "Closed form in three directions (figures 4.10 to 4.12).")
+    out.plot(exact_curves, "t', ns", "modulus", "The exact field in the same directions.")
     return out
 
 
@@ -65,26 +60,26 @@ def _systems(out: Section, lab: Lab) -> None:
     azimuth = np.arctan(215 / 5000)
     rows = []
     for n, step in ((45, 20e6), (225, 4e6), (450, 2e6)):
-        given = {"spacing": -0.015, "frequency_step": step, "azimuth": azimuth}
-        plain, wanted = float(closed.peak_delay(F0, **given)), float(closed.peak_delay(F0, **given, n=n))
-        t = wanted + np.linspace(-1, 1, 2001) / (n * step)
+        geometry = {"spacing": -0.015, "frequency_step": step, "azimuth": azimuth}
+        plain, predicted = float(closed.peak_delay(F0, **geometry)), float(closed.peak_delay(F0, **geometry, n=n))
+        t = predicted + np.linspace(-1, 1, 2001) / (n * step)
         array = AntennaArray.linear(n, spacing=-0.015, frequency_step=step)
         positions = FAR * directions(np.array([azimuth]), 0.0)
         times = FAR / SPEED_OF_LIGHT + t
-        made = np.abs(beam(array, F0, times=times, positions=positions, device=lab.device))[:, 0]
-        found = float(t[made.argmax()])
-        offset = SPEED_OF_LIGHT / 2 * (found - plain)
+        modulus = np.abs(beam(array, F0, times=times, positions=positions, device=lab.device))[:, 0]
+        delay = float(t[modulus.argmax()])
+        offset = SPEED_OF_LIGHT / 2 * (delay - plain)
         out.states(
             f"delay at the aperture's end, N {n}, {step / 1e6:g} MHz", "equation 4.27", f"{1e9 * plain:.4g} ns by it",
-            f"{1e9 * found:.4g} ns, {100 * (found / plain - 1):.1f} % more", abs(found / plain - 1) < 0.02,
+            f"{1e9 * delay:.4g} ns, {100 * (delay / plain - 1):.1f} % more", abs(delay / plain - 1) < 0.02,
             f"the delay follows with f0 + (N - 1) df; {1e3 * offset:.0f} mm of range, the resolution is 167 mm",
-            found / plain,
+            delay / plain,
             rule="within 2 %", cause="interpretation",
         )  # fmt: skip
-        rows.append([f"N {n}, {step / 1e6:g} MHz", f"{found / plain:.4f}", f"{wanted / plain:.4f}",
-                     f"{1e3 * offset:.0f}", f"{made.max() / n:.4f}"])  # fmt: skip
+        rows.append([f"N {n}, {step / 1e6:g} MHz", f"{delay / plain:.4f}", f"{predicted / plain:.4f}",
+                     f"{1e3 * offset:.0f}", f"{modulus.max() / n:.4f}"])  # fmt: skip
     head = ["215 m along, 5 km away", "delay over (4.27)", "f0 + (N - 1) df", "range, mm", "peak over N"]
-    out.parts.append(html.table(head, rows))
+    out.table(head, rows)
 
 
 def snapshots(lab: Lab) -> Section:
@@ -106,20 +101,16 @@ def snapshots(lab: Lab) -> Section:
         retarded = t - distance / SPEED_OF_LIGHT
         gate = np.abs(retarded) <= 0.5 / STEP
         exact = np.abs(beam(array, F0, times=t, positions=place, device=lab.device)) * gate
-        out.draw(html.picture(
-            decibels(exact / N, -60), *edges, "cross-range, m", "range, m",
-            f"Exact field, {ns} ns after the pulse left.",
-            floor_db=-15,
-        ))  # fmt: skip
+        y_name = f"Exact field, {ns} ns after the pulse left."
+        out.picture(decibels(exact / N, -60), *edges, "cross-range, m", "range, m", y_name, floor_db=-15)
         if ns == 2:
-            level = np.abs(closed.waveform(
-                F0, N, spacing=-HALF_WAVE, frequency_step=STEP, azimuth=azimuth, retarded=retarded
-            ))  # fmt: skip
+            level = np.abs(
+                closed.waveform(F0, N, spacing=-HALF_WAVE, frequency_step=STEP, azimuth=azimuth, retarded=retarded)
+            )
             late = out.parts.pop()
-            out.draw(late, html.picture(
-                decibels(level * gate / N, -60), *edges, "cross-range, m", "range, m",
-                "Closed form, 2 ns: what figure 4.9 shows.", floor_db=-15,
-            ))  # fmt: skip
+            out.draw(late)
+            y_name = "Closed form, 2 ns: what figure 4.9 shows."
+            out.picture(decibels(level * gate / N, -60), *edges, "cross-range, m", "range, m", y_name, floor_db=-15)
             _orders(out, level * gate, distance, azimuth)
             _normals(out, decibels(level * gate / N, -60), edges)
     return out
@@ -137,18 +128,16 @@ def _normals(out: Section, level: np.ndarray, edges: tuple[tuple[float, float], 
     radial = at / np.linalg.norm(at)
     across = np.array([along[1], -along[0]]) / np.linalg.norm(along)
     apart = float(np.degrees(np.arccos(np.clip(radial @ across, -1, 1))))
+    item = "directions of uniform phase and of uniform amplitude at 30 deg, 2 ns"
     out.states(
-        "directions of uniform phase and of uniform amplitude at 30 deg, 2 ns", "figure 4.13", "they differ",
-        f"by {apart:.0f} deg", apart > 5, value=apart, rule="by more than 5 deg",
-    )  # fmt: skip
+        item, "figure 4.13", "they differ", f"by {apart:.0f} deg", apart > 5, value=apart, rule="by more than 5 deg"
+    )
     rays = [
         (name, [at[1], at[1] + 0.4 * d[1]], [at[0], at[0] + 0.4 * d[0]])
         for name, d in (("normal of uniform phase", radial), ("normal of uniform amplitude", across))
     ]
-    out.draw(html.picture(
-        level, *edges, "cross-range, m", "range, m", "Closed form, 2 ns, with two normals at 30 deg (figure 4.13).",
-        floor_db=-15, lines=rays,
-    ))  # fmt: skip
+    y_name = "Closed form, 2 ns, with two normals at 30 deg (figure 4.13)."
+    out.picture(level, *edges, "cross-range, m", "range, m", y_name, floor_db=-15, lines=rays)
 
 
 def _orders(out: Section, level: np.ndarray, distance: np.ndarray, azimuth: np.ndarray) -> None:

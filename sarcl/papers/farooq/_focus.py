@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from ...arrays import array_factor as closed
-from ...figures import html
 from ..paper import Section
 from ._lab import Lab, system
 from ._reference import DIAMOND, PRINTED
@@ -25,13 +24,11 @@ def section(lab: Lab) -> Section:
         case = system(n, step, mirrored=False)
         name = f"N {n}, {step / 1e6:g} MHz"
         raw = lab.mapped(case, None)
-        at, values = lab.cut(raw)
+        places, values = lab.cut(raw)
         lost = float(20 * np.log10(values.max()))
-        where = float(at[values.argmax()])
+        where = float(places[values.argmax()])
         wide = lab.measure(raw)["irw"]
-        linear, whole = (
-            lab.measure(lab.mapped(case, "corrected", quadratic=q)) for q in (False, True)
-        )  # fmt: skip
+        linear, full = (lab.measure(lab.mapped(case, "corrected", quadratic=q)) for q in (False, True))
         range_null = lab.measure(lab.mapped(case, "corrected"), 0)["null"]
         out.states(
             f"unmodified, {name}", "figure 5.1" if n == 45 else "section 5.1", "defocused",
@@ -39,15 +36,17 @@ def section(lab: Lab) -> Section:
             value=[lost, where, wide],
             rule="peak below -3 dB",
         )  # fmt: skip
-        out.number(f"corrected, {name}: nulls in cross-range", "figure 5.2" if n == 45 else "section 5.1", PRINTED,
-                   whole["null"], 0.002, "m")  # fmt: skip
+        item = f"corrected, {name}: nulls in cross-range"
+        out.number(item, "figure 5.2" if n == 45 else "section 5.1", PRINTED, full["null"], 0.002, "m")
         if n == 45:
             out.number(f"corrected, {name}: nulls in range", "figure 5.2", PRINTED, range_null, 0.002, "m")
         off = abs(linear["null"] - PRINTED) > 0.002 or linear["level_db"] < -0.3
         phase = closed.quadratic_phase(
-            shape=(n, 1), spacing=(case.step, 0), frequency_step=(step, 0),
+            shape=(n, 1),
+            spacing=(case.step, 0),
+            frequency_step=(step, 0),
             cosines=(np.sin(np.arctan(case.aperture / 2 / case.distance)), 0),
-        )  # fmt: skip
+        )
         out.states(
             f"equations 5.4 and 5.5 alone, {name}", "section 5.1", "focused",
             f"null {linear['null']:.3f} m, peak {linear['level_db']:.2f} dB, PSLR {linear['pslr_db']:.1f} dB", not off,
@@ -56,22 +55,20 @@ def section(lab: Lab) -> Section:
             rule="null within 2 mm of 0.167 m, peak above -0.3 dB", cause="interpretation",
         )  # fmt: skip
         table.append([name, f"{lost:.1f}", f"{phase:.2f}", f"{linear['null']:.3f}", f"{linear['level_db']:.2f}",
-                      f"{linear['pslr_db']:.1f}", f"{whole['null']:.3f}", f"{whole['pslr_db']:.1f}"])  # fmt: skip
+                      f"{linear['pslr_db']:.1f}", f"{full['null']:.3f}", f"{full['pslr_db']:.1f}"])  # fmt: skip
         for quadratic, label in ((True, "corrected"), (False, "linear part")):
-            at, values = lab.cut(lab.mapped(case, "corrected", quadratic=quadratic), half=0.8, n=321)
-            curves.append((f"{name}, {label}", at, values))
+            places, values = lab.cut(lab.mapped(case, "corrected", quadratic=quadratic), half=0.8, n=321)
+            curves.append((f"{name}, {label}", places, values))
     out.say(
         "By equation 4.27 the peak of every pulse is at a wrong range of its own, which smears the image of figure "
         "5.1. Taking out delay and phase focuses it. The paper takes out the part that is linear in the element's "
         "number; for 225 and 450 elements the quadratic rest is no longer small."
     )
-    out.parts.append(html.table(
+    out.table(
         ["", "unmodified peak, dB", "quadratic phase, rad", "linear: null, m", "peak, dB", "PSLR, dB", "all: null, m",
          "PSLR, dB"], table,
-    ))  # fmt: skip
-    out.draw(
-        lab.picture(lab.mapped(first, None, DIAMOND), "Unmodified backprojection, N 45, 20 MHz (figure 5.1)."),
-        lab.picture(lab.mapped(first, "corrected", DIAMOND), "Delay and phase corrected (figure 5.2)."),
-        html.plot(curves, "cross-range, m", "modulus", "The centre point, with and without the quadratic phase."),
-    )
+    )  # fmt: skip
+    out.draw(lab.picture(lab.mapped(first, None, DIAMOND), "Unmodified backprojection, N 45, 20 MHz (figure 5.1)."))
+    out.draw(lab.picture(lab.mapped(first, "corrected", DIAMOND), "Delay and phase corrected (figure 5.2)."))
+    out.plot(curves, "cross-range, m", "modulus", "The centre point, with and without the quadratic phase.")
     return out

@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ...arrays.map_aperture import MapKind, map_aperture
 from ...experiments.fda.case import Case
@@ -15,6 +16,7 @@ from ...imaging.backproject import backproject
 from ...model.image_grid import ImageGrid
 from ...model.phase_history import PhaseHistory
 from ...model.waveform import Waveform
+from ...opencl.device import DeviceChoice
 from ...scene.scene import Scene
 from ...simulation.echo import echo
 
@@ -28,7 +30,7 @@ class Lab:
     device  an OpenCL device as elsewhere;  quick  leave out arrays of more than 100 elements
     """
 
-    def __init__(self, device: Any = None, quick: bool = False) -> None:
+    def __init__(self, device: DeviceChoice | None = None, quick: bool = False) -> None:
         self.device, self.quick = device, quick
         self._kept: dict[Any, PhaseHistory] = {}
 
@@ -36,25 +38,25 @@ class Lab:
         """Whether an array of n elements is part of the run."""
         return not self.quick or n <= 100
 
-    def collect(self, case: Case, points: Any = CENTER) -> PhaseHistory:
+    def collect(self, case: Case, points: ArrayLike = CENTER) -> PhaseHistory:
         """Echoes of unit points, m (n, 3), channels added up at the reference element."""
-        points = tuple(tuple(float(v) for v in p) for p in points)
-        key = (replace(case, name=""), points)
+        places = np.asarray(points, np.float64)
+        key = (replace(case, name=""), places.tobytes())
         if key not in self._kept:
             step = case.channel_step
             tone = Waveform.tone(center=case.center, duration=1 / step)
             self._kept[key] = echo(
-                Scene.points(points), tone, case.track(), array=case.array(), reference=(0, 0, 0),
+                Scene.points(places), tone, case.track(), array=case.array(), reference=(0, 0, 0),
                 range_window=_window(step), tolerance=1e-4, check=False, device=self.device,
             )  # fmt: skip
         return self._kept[key]
 
-    def mapped(self, case: Case, mapping: MapKind | None, points: Any = CENTER, **options: Any) -> PhaseHistory:
+    def mapped(self, case: Case, mapping: MapKind | None, points: ArrayLike = CENTER, **options: Any) -> PhaseHistory:
         """The echoes of `collect`, mapped; mapping None: as collected."""
         raw = self.collect(case, points)
         return raw if mapping is None else map_aperture(raw, mapping, **options)
 
-    def single(self, case: Case, waveform: Waveform, points: Any = CENTER) -> PhaseHistory:
+    def single(self, case: Case, waveform: Waveform, points: ArrayLike = CENTER) -> PhaseHistory:
         """Echoes of one antenna on the case's track."""
         return echo(
             Scene.points(points), waveform, case.track(), reference=(0, 0, 0), range_window=(-5.0, 5.0),
@@ -65,27 +67,26 @@ class Lab:
         """dB (along range, cross-range) about the origin, over HALF/zoom m each way; a focused unit point has 0."""
         shape = tuple(2 * round(half / STEP) + 1 for half in HALF[::-1])
         grid = ImageGrid.plane(shape=shape, spacing=STEP / zoom)
-        made = backproject(raw, grid, tolerance=1e-3, check=False, device=self.device)
-        return np.maximum(made.decibels().T, -200.0)
+        image = backproject(raw, grid, tolerance=1e-3, check=False, device=self.device)
+        return np.maximum(image.decibels().T, -200.0)
 
     def picture(self, raw: PhaseHistory, caption: str, zoom: float = 1.0, box: float | None = None) -> html.Block:
         """The image as a figure, white where it is brightest; box: half the side of a dashed square, m."""
         edges = (-HALF[1] / zoom, HALF[1] / zoom), (-HALF[0] / zoom, HALF[0] / zoom)
         square = None if box is None else (box, box)
         return html.picture(
-            self.image(raw, zoom), *edges, "cross-range, m", "range, m", caption, floor_db=-30.0, box=square,
-            equal=True,
-        )  # fmt: skip
+            self.image(raw, zoom), *edges, "cross-range, m", "range, m", caption, floor_db=-30.0, box=square, equal=True
+        )
 
     def cut(
         self, raw: PhaseHistory, axis: int = 1, half: float = 2.0, n: int = 801, about: float = 0.0
     ) -> tuple[np.ndarray, np.ndarray]:
         """Places along range (axis 0) or cross-range (1), m (n,), and amplitudes (n,), 1 of a focused unit point."""
-        at = about + np.linspace(-half, half, n)
+        offsets = about + np.linspace(-half, half, n)
         places = np.zeros((n, 3))
-        places[:, axis] = at
-        made = backproject(raw, ImageGrid.points(places), tolerance=1e-3, check=False, device=self.device)
-        return at, np.abs(made.normalized())
+        places[:, axis] = offsets
+        image = backproject(raw, ImageGrid.points(places), tolerance=1e-3, check=False, device=self.device)
+        return offsets, np.abs(image.normalized())
 
     def measure(self, raw: PhaseHistory, axis: int = 1, half: float = 2.0, about: float = 0.0) -> dict[str, float]:
         """Response of a point `about` m along the axis: what `sarcl.fda.response` measures on a cut."""

@@ -34,27 +34,35 @@ def section(lab: Lab) -> Section:
         shifts = [p["error"] for p in apparent["points"]]
         off = max(shifts, key=abs)
         out.states(
-            f"{name}: places of points 2 and 2.25 m off", "section 5.4", "more defocused off the centre",
+            f"{name}: places of points 2 and 2.25 m off",
+            "section 5.4",
+            "more defocused off the centre",
             f"{shifts[1]:+.3f} and {shifts[2]:+.3f} m off, PSLR "
-            + ", ".join(f"{p['pslr_db']:.1f}" for p in apparent["points"][1:]) + " dB",
+            + ", ".join(f"{p['pslr_db']:.1f}" for p in apparent["points"][1:])
+            + " dB",
             abs(off) < 0.1 * plain["points"][0]["null"],
             "not only defocused but displaced, with a side lobe nearly as high as the peak; worst where 4 k g y/R is "
-            "an odd multiple of pi", shifts,
-            rule="displaced by less than a tenth of the null", cause="interpretation",
-        )  # fmt: skip
+            "an odd multiple of pi",
+            shifts,
+            rule="displaced by less than a tenth of the null",
+            cause="interpretation",
+        )
         least = [row["told_apart"] for row in (apparent, plain)]
         largest = _reason(apparent["dips"][-1], result["null"])
         dips = [
             next(d["dip_db"] for d in row["dips"] if d["separation"] == SEPARATIONS[0]) for row in (apparent, plain)
         ]
         out.states(
-            f"{name}: two points resolved", "figure 5.10", "finer cross-range resolution",
+            f"{name}: two points resolved",
+            "figure 5.10",
+            "finer cross-range resolution",
             f"{_from(least[0])}; conventional antenna: {_from(least[1])}",
             experiment.nearer(apparent, plain, result["null"]) == 1,
-            f"{largest}. At {SEPARATIONS[0]:g} m the dip is {dips[0]:.1f} dB, conventional {dips[1]:.1f} dB", least,
+            f"{largest}. At {SEPARATIONS[0]:g} m the dip is {dips[0]:.1f} dB, conventional {dips[1]:.1f} dB",
+            least,
             rule="resolved at a smaller separation than by the conventional antenna. Resolved: " + rule(result["null"]),
             cause="interpretation",
-        )  # fmt: skip
+        )
         spans = [row["claimed"] for row in (own, apparent, plain)]
         out.states(
             f"{name}: spatial frequencies across", "section 5.3.1", "an apparent aperture that is longer",

@@ -42,14 +42,9 @@ def patterns(lab: Lab) -> Section:
         return power, (float(ANGLES[row]), float(ANGLES[column]))
 
     still, at = look(plain, 0.0)
+    rule = "that direction, on a grid of 1 deg"
     out.states(
-        "CFA: beam",
-        "figure 3.3, equations 3.29, 3.30",
-        "(0, 0) deg",
-        _deg(at),
-        at == (0, 0),
-        value=at,
-        rule="that direction, on a grid of 1 deg",
+        "CFA: beam", "figure 3.3, equations 3.29, 3.30", "(0, 0) deg", _deg(at), at == (0, 0), value=at, rule=rule
     )
     figures = [_sky(still, "One carrier (figure 3.3).")]
     for plane, figure, elevated in (("azimuth", "3.5", False), ("elevation", "3.4", True)):
@@ -60,26 +55,18 @@ def patterns(lab: Lab) -> Section:
             for r in (1e3, 1e5)
         )
         off = float(np.abs(near - far).max())
-        out.states(
-            f"CFA: change with range, 1 to 100 km, along {plane}", f"figure {figure}", "none", f"{off:.1e} of the peak",
-            off < 1e-2, value=off,
-            rule="below 0.01 of the peak",
-        )  # fmt: skip
+        item = f"CFA: change with range, 1 to 100 km, along {plane}"
+        rule = "below 0.01 of the peak"
+        out.states(item, f"figure {figure}", "none", f"{off:.1e} of the peak", off < 1e-2, value=off, rule=rule)
         figures.append(html.plot(
             [("1 km", ANGLES, decibels(near, -60)), ("100 km", ANGLES, decibels(far, -60))], f"{plane}, deg", "dB",
             f"One carrier, cut along {plane} at two ranges (figure {figure}).",
         ))  # fmt: skip
     start, _ = look(diverse, 0.0)
     off = float(np.abs(start - still).max())
-    out.states(
-        "FDA at t' = 0",
-        "figure 3.6",
-        "identical to the CFA",
-        f"differs by {off:.1e}",
-        off < 1e-2,
-        value=off,
-        rule="below 0.01 of the peak",
-    )
+    measured = f"differs by {off:.1e}"
+    rule = "below 0.01 of the peak"
+    out.states("FDA at t' = 0", "figure 3.6", "identical to the CFA", measured, off < 1e-2, value=off, rule=rule)
     figures.append(_sky(start, "Diverse carriers at t' = 0 (figure 3.6)."))
     for sign in (1, -1):
         power, at = look(diverse, sign * TIME)
@@ -105,18 +92,16 @@ def patterns(lab: Lab) -> Section:
 def _over_range(out: Section, figures: list[html.Block], array: AntennaArray, lab: Lab) -> None:
     """Figures 3.8 and 3.9: principal planes at t = 0, over range."""
     ranges, angle = np.arange(2e3, 302e3, 2e3), np.radians(ANGLES)
-    for name, figure, wanted, u in (
+    for name, figure, sign, u in (
         ("elevation", "3.8", 1, directions(0 * angle, angle)),
         ("azimuth", "3.9", -1, directions(angle, 0.0)),
     ):
         power = np.abs(beam(array, F0, times=0.0, positions=ranges[:, None, None] * u, device=lab.device)) / 81
         peak = float(ANGLES[int(power[24].argmax())])  # 50 km out
-        out.states(
-            f"FDA: {name} of the beam at t = 0, 50 km out", f"figure {figure}",
-            f"scans toward {'positive' if wanted > 0 else 'negative'} {name}", f"{peak:+.0f} deg",
-            np.sign(peak) == wanted, value=peak,
-            rule="sign of the angle",
-        )  # fmt: skip
+        item = f"FDA: {name} of the beam at t = 0, 50 km out"
+        expected = f"scans toward {'positive' if sign > 0 else 'negative'} {name}"
+        rule = "sign of the angle"
+        out.states(item, f"figure {figure}", expected, f"{peak:+.0f} deg", np.sign(peak) == sign, value=peak, rule=rule)
         figures.append(html.picture(
             decibels(power.T, -60), (0.0, 302.0), (-85.5, 85.5), "range, km", f"{name}, deg",
             f"Diverse carriers at t = 0 over range (figure {figure}).", floor_db=-40,
@@ -143,36 +128,36 @@ def errors(lab: Lab) -> Section:
             F0, shape=SHAPE, spacing=SPACING, frequency_step=(step, 0), cosines=(np.sin(azimuth), 0.0),
             retarded=t[:, None],
         )  # fmt: skip
-        exact, made = (closed.power_pattern(f, 81) for f in (field, factor))
-        apart = np.abs(exact - made).max(axis=0)
+        exact, approximate = (closed.power_pattern(f, 81) for f in (field, factor))
+        apart = np.abs(exact - approximate).max(axis=0)
         curves.append((f"{step / 1e6:g} MHz", degrees, apart))
         worst, where = float(apart.max()), abs(float(degrees[apart.argmax()]))
         text = f"{worst:.3f} ({10 * np.log10(worst):.2f} dB) at +-{where:.0f} deg"
         if name == "A":
-            out.states(
-                "largest error of the power pattern, 30 MHz", "figure 3.11", "not appreciable", text, worst < 0.05,
-                "the figures show the top 3 dB; near +-90 deg the patterns differ by a fifth of the peak", worst,
-                rule="below 0.05 of the peak power", cause="interpretation",
-            )  # fmt: skip
+            item = "largest error of the power pattern, 30 MHz"
+            why = "the figures show the top 3 dB; near +-90 deg the patterns differ by a fifth of the peak"
+            rule = "below 0.05 of the peak power"
+            expected = "not appreciable"
+            out.states(item, "figure 3.11", expected, text, worst < 0.05, why, worst, rule=rule, cause="interpretation")
         else:
-            out.number(
-                "largest error of the power pattern, 150 MHz", "figure 3.14", -1.2, 10 * np.log10(worst), 0.06, "dB",
-                ".2f", f"{text}",
-            )  # fmt: skip
+            item = "largest error of the power pattern, 150 MHz"
+            out.number(item, "figure 3.14", -1.2, 10 * np.log10(worst), 0.06, "dB", ".2f", f"{text}")
             at20 = float(apart[np.isclose(degrees, 20)][0])
+            item = "error inside +-45 deg, 150 MHz"
+            measured = f"{at20:.2f} at 20 deg, {float(apart[np.isclose(degrees, 45)][0]):.2f} at 45 deg"
+            why = "equation 3.60 itself gives 3.5 pi/4 at 45 deg; equation 3.40 allows pi/4"
+            rule = "below 0.1 of the peak power at 20 deg"
+            expected = "not significant"
             out.states(
-                "error inside +-45 deg, 150 MHz", "figure 3.14", "not significant",
-                f"{at20:.2f} at 20 deg, {float(apart[np.isclose(degrees, 45)][0]):.2f} at 45 deg", at20 < 0.1,
-                "equation 3.60 itself gives 3.5 pi/4 at 45 deg; equation 3.40 allows pi/4", at20,
-                rule="below 0.1 of the peak power at 20 deg", cause="interpretation",
-            )  # fmt: skip
+                item, "figure 3.14", expected, measured, at20 < 0.1, why, at20, rule=rule, cause="interpretation"
+            )
         figures = ("3.10", "3.11") if name == "A" else ("3.12", "3.13")
         out.draw(*(
             html.picture(
                 np.maximum(10 * np.log10(np.maximum(p, 1e-9)), -60).T, (0.0, 1e9 / step), (-90.0, 90.0), "t', ns",
                 "azimuth, deg", f"{what} power pattern, {step / 1e6:g} MHz (figure {figure}).", floor_db=-20,
             )
-            for what, p, figure in zip(("Exact", "Closed-form"), (exact, made), figures, strict=True)
+            for what, p, figure in zip(("Exact", "Closed-form"), (exact, approximate), figures, strict=True)
         ))  # fmt: skip
         out.keep(**{f"error, {step / 1e6:g} MHz": {"deg": degrees[::4], "error": apart[::4]}})
     bound = closed.quadratic_phase(shape=SHAPE, spacing=(0.015, 0.015), frequency_step=(30e6, 0), cosines=(1, 0))
@@ -181,7 +166,7 @@ def errors(lab: Lab) -> Section:
         shape=SHAPE, spacing=(0.015, 0.015), frequency_step=(150e6, 0), cosines=(np.sin(np.pi / 4), 0)
     )
     out.number("quadratic phase of scenario B at 45 deg", "equation 3.60", 3.5, steep / (np.pi / 4), 0.1, "pi/4", ".2f")
-    out.draw(html.plot(curves, "azimuth, deg", "difference", "Difference of the patterns (figure 3.14)."))
+    out.plot(curves, "azimuth, deg", "difference", "Difference of the patterns (figure 3.14).")
     return out
 
 

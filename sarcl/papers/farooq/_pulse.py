@@ -8,7 +8,6 @@ from ...arrays import array_factor as closed
 from ...arrays.ambiguity import Ambiguity, ambiguity
 from ...arrays.beam import beam
 from ...base.constants import SPEED_OF_LIGHT
-from ...figures import html
 from ...model.antenna_array import AntennaArray
 from ..paper import Section
 from ._lab import Lab, decibels
@@ -25,8 +24,8 @@ def waveform(lab: Lab) -> Section:
     out = Section("waveform", "The pulse of 9 elements in steps of 1 GHz (table 4.1, figures 4.1 to 4.5)")
     array = AntennaArray.linear(N, spacing=-HALF_WAVE, frequency_step=STEP)
     t = np.linspace(-0.5e-9, 1.5e-9, 4001)
-    made = beam(array, F0, times=FAR / SPEED_OF_LIGHT + t, positions=FAR * np.array(BORESIGHT), device=lab.device)
-    level = np.abs(made[:, 0])
+    field = beam(array, F0, times=FAR / SPEED_OF_LIGHT + t, positions=FAR * np.array(BORESIGHT), device=lab.device)
+    level = np.abs(field[:, 0])
     half = len(t) // 2
     first, second = t[level[:half].argmax()], t[half + int(level[half:].argmax())]
     out.number("period", "figure 4.2", 1.0, 1e9 * (second - first), 1e-3, "ns")
@@ -38,46 +37,35 @@ def waveform(lab: Lab) -> Section:
         beam(slow, F0, times=FAR / SPEED_OF_LIGHT + t, positions=FAR * np.array(BORESIGHT), device=lab.device)
     )
     ripple = float(np.ptp(flat) / N)
-    out.states(
-        "1 kHz steps: modulation over 2 ns", "figure 4.1", "none", f"{ripple:.1e} of the peak", ripple < 1e-3,
-        value=ripple,
-        rule="below 0.001 of the peak",
-    )  # fmt: skip
-    f, channels, whole = spectra()
-    middle = float((f * whole**2).sum() / (whole**2).sum())
+    item = "1 kHz steps: modulation over 2 ns"
+    rule = "below 0.001 of the peak"
+    out.states(item, "figure 4.1", "none", f"{ripple:.1e} of the peak", ripple < 1e-3, value=ripple, rule=rule)
+    f, channels, total = spectra()
+    middle = float((f * total**2).sum() / (total**2).sum())
     out.number("centre frequency of the pulse", "figure 4.5, equation 4.6", 14.0, middle / 1e9, 0.1, "GHz", ".2f")
     # Energy within a band of N df about the middle; the tails of the outer tones lie outside.
     inside = np.abs(f - 14e9) <= N * STEP / 2
-    share = float((whole[inside] ** 2).sum() / (whole**2).sum())
-    out.states(
-        "bandwidth", "figure 4.5, equation 4.18", "9 GHz", f"{100 * share:.1f} % of the energy lies within 9 GHz",
-        share > 0.95, value=share,
-        rule="more than 95 % of the energy",
-    )  # fmt: skip
+    share = float((total[inside] ** 2).sum() / (total**2).sum())
+    measured = f"{100 * share:.1f} % of the energy lies within 9 GHz"
+    rule = "more than 95 % of the energy"
+    out.states("bandwidth", "figure 4.5, equation 4.18", "9 GHz", measured, share > 0.95, value=share, rule=rule)
     crossing = 20 * np.log10(float(channels[0][np.isclose(f, F0 + STEP / 2, atol=2e6)].max()))
+    item = "neighbouring channels cross"
     out.states(
-        "neighbouring channels cross",
-        "figure 4.4",
-        "below 3 dB",
-        f"{crossing:.2f} dB",
-        crossing < -3,
-        value=crossing,
-        rule="below -3 dB",
+        item, "figure 4.4", "below 3 dB", f"{crossing:.2f} dB", crossing < -3, value=crossing, rule="below -3 dB"
     )
     out.say(
         "Exact field at boresight. A pulse as long as the period has one peak; its spectrum is nine tones side by side."
     )
     shown = (f >= 7e9) & (f <= 21e9)
-    out.draw(
-        html.plot([("1 GHz", 1e9 * t, made[:, 0].real)], "t', ns", "field", "The wave, real part (figure 4.2)."),
-        html.plot([("1 GHz", 1e9 * t, level), ("1 kHz", 1e9 * t, flat[:, 0])], "t', ns", "modulus",
-                  "Its modulus (figure 4.3), and with steps of 1 kHz (figure 4.1)."),
-        html.plot([(f"{(F0 + i * STEP) / 1e9:g} GHz", f[shown] / 1e9, decibels(c[shown]))
-                   for i, c in enumerate(channels)],
-                  "frequency, GHz", "dB", "Spectra of the channels (figure 4.4)."),
-        html.plot([("sum", f[shown] / 1e9, decibels(whole[shown] / whole.max()))], "frequency, GHz", "dB",
-                  "Spectrum of the pulse (figure 4.5)."),
-    )  # fmt: skip
+    out.plot([("1 GHz", 1e9 * t, field[:, 0].real)], "t', ns", "field", "The wave, real part (figure 4.2).")
+    caption = "Its modulus (figure 4.3), and with steps of 1 kHz (figure 4.1)."
+    out.plot([("1 GHz", 1e9 * t, level), ("1 kHz", 1e9 * t, flat[:, 0])], "t', ns", "modulus", caption)
+    out.plot([(f"{(F0 + i * STEP) / 1e9:g} GHz", f[shown] / 1e9, decibels(c[shown]))
+               for i, c in enumerate(channels)],
+              "frequency, GHz", "dB", "Spectra of the channels (figure 4.4).")  # fmt: skip
+    caption = "Spectrum of the pulse (figure 4.5)."
+    out.plot([("sum", f[shown] / 1e9, decibels(total[shown] / total.max()))], "frequency, GHz", "dB", caption)
     out.keep(modulus={"ns": 1e9 * t[::20], "modulus": level[::20]})
     return out
 
@@ -105,43 +93,37 @@ def ambiguities(lab: Lab) -> Section:
     shifts = np.abs(chirp.dopplers) < band / 3
     moved, stays = (np.abs(a.delay_of_peak()[shifts]).max() * RATE for a in (chirp, tones))
     fit = float(np.polyfit(chirp.dopplers[shifts], chirp.delay_of_peak()[shifts], 1)[0] * slope)
-    out.states(
-        "chirp: delay of the peak with Doppler", "figure 4.6", "range-Doppler coupling",
-        f"{fit:.3f} of nu T/B; up to {moved:.0f} samples", abs(fit - 1) < 0.05, value=fit,
-        rule="within 5 % of nu T/B",
-    )  # fmt: skip
-    out.states(
-        "tones: delay of the peak, |nu| < 3 GHz", "figure 4.7", "no coupling", f"{stays:.0f} of {len(t)} samples",
-        stays <= 1.01, value=stays,
-        rule="at most one sample",
-    )  # fmt: skip
+    item = "chirp: delay of the peak with Doppler"
+    measured = f"{fit:.3f} of nu T/B; up to {moved:.0f} samples"
+    rule = "within 5 % of nu T/B"
+    out.states(item, "figure 4.6", "range-Doppler coupling", measured, abs(fit - 1) < 0.05, value=fit, rule=rule)
+    item = "tones: delay of the peak, |nu| < 3 GHz"
+    measured = f"{stays:.0f} of {len(t)} samples"
+    out.states(item, "figure 4.7", "no coupling", measured, stays <= 1.01, value=stays, rule="at most one sample")
     ridge = _ridge(tones, slope, length)
-    out.states(
-        "tones: largest value on the chirp's ridge", "figure 4.7", "no ridge",
-        f"{ridge:.2f}, where the chirp has {_ridge(chirp, slope, length, np.min):.2f} or more", ridge < 0.25,
-        value=ridge,
-        rule="below 0.25",
-    )  # fmt: skip
+    item = "tones: largest value on the chirp's ridge"
+    measured = f"{ridge:.2f}, where the chirp has {_ridge(chirp, slope, length, np.min):.2f} or more"
+    out.states(item, "figure 4.7", "no ridge", measured, ridge < 0.25, value=ridge, rule="below 0.25")
     cuts = [(name, a.magnitude[:, int(np.abs(a.dopplers).argmin())]) for name, a in (("FDA", tones), ("LFM", chirp))]
     nulls = [1e9 * tones.delays[tones.delays > 0][int((np.diff(c[tones.delays > 0]) > 0).argmax())] for _, c in cuts]
-    out.states(
-        "first nulls of both without Doppler", "figure 4.8", "similar range resolution",
-        f"{nulls[0]:.3f} and {nulls[1]:.3f} ns", abs(nulls[0] - nulls[1]) < 0.03, value=nulls,
-        rule="difference below 0.03 ns",
-    )  # fmt: skip
+    item = "first nulls of both without Doppler"
+    expected = "similar range resolution"
+    measured = f"{nulls[0]:.3f} and {nulls[1]:.3f} ns"
+    rule = "difference below 0.03 ns"
+    out.states(item, "figure 4.8", expected, measured, abs(nulls[0] - nulls[1]) < 0.03, value=nulls, rule=rule)
     out.say(
         "Both last 1 ns and have a bandwidth of 9 GHz. With the chirp a Doppler shift becomes a range error (the "
         "ridge). With the tones the peak stays, but a plateau covers the plane: the volume is 1 for both."
     )
     for name, a, figure in (("LFM", chirp, "4.6"), ("FDA", tones, "4.7")):
-        out.draw(html.picture(
+        out.picture(
             decibels(a.magnitude.T, -80), (1e9 * a.delays[0], 1e9 * a.delays[-1]),
             (a.dopplers[0] / 1e9, a.dopplers[-1] / 1e9), "delay, ns", "Doppler, GHz",
             f"{name}: modulus of the ambiguity function (figure {figure}).", floor_db=-30,
-        ))  # fmt: skip
-    out.draw(html.plot(
+        )  # fmt: skip
+    out.plot(
         [(name, 1e9 * tones.delays, c) for name, c in cuts], "delay, ns", "modulus", "Without Doppler (figure 4.8)."
-    ))  # fmt: skip
+    )
     return out
 
 

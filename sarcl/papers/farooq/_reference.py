@@ -6,7 +6,6 @@ import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
 from ...experiments.fda.case import Case
-from ...figures import html
 from ...model.waveform import Waveform
 from ..paper import Section
 from ._lab import Lab
@@ -41,12 +40,14 @@ def section(lab: Lab) -> Section:
         "(The paper calls the centre point Target #6, so its arrangement was different.)"
     )
     out.draw(*figures)
-    for figure, (way, found) in zip(("2.15", "2.16"), curves.items(), strict=True):
-        out.draw(html.plot(
-            [(name, at, values / values.max()) for name, (at, values) in found.items()], f"{way}, m", "modulus",
+    for figure, (way, response) in zip(("2.15", "2.16"), curves.items(), strict=True):
+        out.plot(
+            [(name, places, values / values.max()) for name, (places, values) in response.items()],
+            f"{way}, m",
+            "modulus",
             f"Cut through the centre point along {way} (figure {figure}).",
-        ))  # fmt: skip
-        out.keep(**{f"{way} {name}": {"m": at[::4], "modulus": v[::4]} for name, (at, v) in found.items()})
+        )
+        out.keep(**{f"{way} {name}": {"m": places[::4], "modulus": v[::4]} for name, (places, v) in response.items()})
     return out
 
 
@@ -56,19 +57,17 @@ def _shapes(out: Section, curves: dict[str, dict[str, tuple[np.ndarray, np.ndarr
     for name, law, wanted in (("LFM", "sinc", _sinc), ("tone", "triangular", _triangle)):
         at, values = curves["range"][name]
         off = float(np.abs(values / values.max() - wanted(at / cell)).max())
-        out.states(
-            f"{name}: shape of the range response", "figure 2.15", law, f"{law} to {off:.3f} of the peak", off < 0.05,
-            value=off,
-            rule="within 0.05 of the peak",
-        )  # fmt: skip
+        item = f"{name}: shape of the range response"
+        measured = f"{law} to {off:.3f} of the peak"
+        out.states(item, "figure 2.15", law, measured, off < 0.05, value=off, rule="within 0.05 of the peak")
     at, chirp = curves["cross-range"]["LFM"]
     tone = curves["cross-range"]["tone"][1]
     off = float(np.abs(chirp / chirp.max() - tone / tone.max()).max())
+    measured = f"differ by {off:.3f} of the peak"
+    rule = "difference below 0.05 of the peak"
     out.states(
-        "cross-range responses of both", "figure 2.16", "nearly identical", f"differ by {off:.3f} of the peak",
-        off < 0.05, value=off,
-        rule="difference below 0.05 of the peak",
-    )  # fmt: skip
+        "cross-range responses of both", "figure 2.16", "nearly identical", measured, off < 0.05, value=off, rule=rule
+    )
 
 
 def _sinc(x: np.ndarray) -> np.ndarray:

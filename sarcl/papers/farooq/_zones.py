@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -11,6 +10,7 @@ from ...figures import html
 from ...imaging.backproject import backproject
 from ...model.image_grid import ImageGrid
 from ...model.phase_history import PhaseHistory
+from ...opencl.device import DeviceChoice
 from ...scene.scene import Scene
 from ..paper import Section
 from ._lab import Lab, decibels
@@ -26,22 +26,22 @@ def section(lab: Lab) -> Section:
     out = Section("zones", "Range zones separated by carriers that continue from pulse to pulse")
     radar = RangeZones()
     systems = {"running carriers": radar, "one carrier": replace(radar, step=0.0)}
-    at = np.linspace(-70, 70, 281)
+    places = np.linspace(-70, 70, 281)
     for name, system in systems.items():
-        cuts = cuts_of(system, at, lab.device)
+        cuts = cuts_of(system, places, lab.device)
         levels = matrix(system, lab.device)
         title = f"{name[0].upper()}{name[1:]}"
         out.say(
             f"{title}: level of each zone's point, alone, in the image of every zone, relative to its own zone, dB."
         )
-        out.parts.append(html.table(
+        out.table(
             ["", *(f"image of zone {q}" for q in range(ZONES))],
             [[f"point of zone {p}", *(f"{round(v, 1) + 0.0:.1f}" for v in row)] for p, row in enumerate(levels)],
-        ))  # fmt: skip
-        curves = [(f"zone {q}", at, decibels(c, FLOOR)) for q, c in enumerate(cuts)]
-        out.draw(html.plot(
+        )
+        curves = [(f"zone {q}", places, decibels(c, FLOOR)) for q, c in enumerate(cuts)]
+        out.plot(
             curves, "behind the zone's centre, m", "dB", f"{title}: images of the four zones, from one record. Hamming."
-        ))  # fmt: skip
+        )
         off = levels[~np.eye(ZONES, dtype=bool)]
         out.keep(**{name: {"levels_db": levels, "best_other_db": off.min(), "worst_other_db": off.max()}})
     _sweeps(out, radar, lab)
@@ -61,7 +61,7 @@ def section(lab: Lab) -> Section:
     return out
 
 
-def cuts_of(radar: RangeZones, at: np.ndarray, device: Any = None) -> list[np.ndarray]:
+def cuts_of(radar: RangeZones, at: np.ndarray, device: DeviceChoice | None = None) -> list[np.ndarray]:
     """Amplitudes (n,) of each zone's image, `at` m (n,) behind its centre, with a unit point in every zone."""
     record = collect(radar, [Scene.points([radar.place(q, b)]) for q, b in enumerate(BEYOND)], device)
     weights = np.hamming(record.n_samples)
@@ -69,24 +69,22 @@ def cuts_of(radar: RangeZones, at: np.ndarray, device: Any = None) -> list[np.nd
     return [_image(radar, record, q, at, device=device) for q in range(ZONES)]
 
 
-def matrix(radar: RangeZones, device: Any = None) -> np.ndarray:
+def matrix(radar: RangeZones, device: DeviceChoice | None = None) -> np.ndarray:
     """Levels (point, image), dB: the highest within 5 m of each zone's point in each image, over its own image."""
     out = np.empty((ZONES, ZONES))
     for p, beyond in enumerate(BEYOND):
         empty: list[Scene | None] = [None] * p
         record = collect(radar, [*empty, Scene.points([radar.place(p, beyond)])], device)
-        at = beyond + np.linspace(-5, 5, 41)
-        out[p] = [_image(radar, record, q, at, device=device).max() for q in range(ZONES)]
+        places = beyond + np.linspace(-5, 5, 41)
+        out[p] = [_image(radar, record, q, places, device=device).max() for q in range(ZONES)]
     return np.asarray(20 * np.log10(np.maximum(out / np.diag(out)[:, None], 1e-9)))
 
 
-def leak(radar: RangeZones, apart: int, elevation: float = 0.0, device: Any = None) -> float:
+def leak(radar: RangeZones, apart: int, elevation: float = 0.0, device: DeviceChoice | None = None) -> float:
     """Level in zone 0's image of a point `apart` zones farther, `elevation` rad above, dB relative to its own image."""
     scenes: list[Scene | None] = [None] * apart
     record = collect(radar, [*scenes, Scene.points([radar.place(apart, 0.0, elevation)])], device)
-    levels = [
-        float(_image(radar, record, q, np.zeros(1), up, device)[0]) for q, up in ((0, 0.0), (apart, elevation))
-    ]  # fmt: skip
+    levels = [float(_image(radar, record, q, np.zeros(1), up, device)[0]) for q, up in ((0, 0.0), (apart, elevation))]
     return 20 * float(np.log10(max(levels[0] / levels[1], 1e-9)))
 
 
@@ -95,10 +93,10 @@ def _sweeps(out: Section, radar: RangeZones, lab: Lab) -> None:
     short = replace(radar, n_pulses=2)
     turns, lines = np.linspace(0.02, 0.48, 12), np.linspace(0.005, 0.495, 197)
     angles, fine = np.linspace(-35, 35, 15), np.linspace(-35, 35, 281)
-    whole = np.floor(radar.step / radar.prf)
+    cycles = np.floor(radar.step / radar.prf)
 
     def stepped(turn: float) -> RangeZones:
-        return replace(short, step=(whole + turn) * short.prf)
+        return replace(short, step=(cycles + turn) * short.prf)
 
     for name, x, measured, xs, predicted, axis in (
         ("df over PRF", turns, [leak(stepped(t), 1, device=lab.device) for t in turns], lines,
@@ -110,17 +108,24 @@ def _sweeps(out: Section, radar: RangeZones, lab: Lab) -> None:
         clear = np.array(same) > FLOOR
         error = float(np.abs(np.array(measured) - same)[clear].max())
         out.keep(**{name: {"at": x, "measured_db": measured, "predicted_db": same, "largest_error_db": error}})
-        out.draw(html.plot(
-            [("predicted", xs, np.maximum(predicted, FLOOR)), ("measured", x, np.maximum(measured, FLOOR))], axis, "dB",
+        out.plot(
+            [("predicted", xs, np.maximum(predicted, FLOOR)), ("measured", x, np.maximum(measured, FLOOR))],
+            axis,
+            "dB",
             f"The next zone's point in zone 0's image, against {name}; largest difference {error:.2f} dB.",
             dots=("measured",),
-        ))  # fmt: skip
+        )
 
 
 def _image(
-    radar: RangeZones, record: PhaseHistory, zone: int, at: np.ndarray, elevation: float = 0.0, device: Any = None
+    radar: RangeZones,
+    record: PhaseHistory,
+    zone: int,
+    at: np.ndarray,
+    elevation: float = 0.0,
+    device: DeviceChoice | None = None,
 ) -> np.ndarray:
     """Amplitudes of a zone's image, `at` m behind its centre (n,)."""
     grid = ImageGrid.points(np.stack([radar.place(zone, b, elevation) for b in at]))
-    made = backproject(of_zone(radar, record, zone), grid, tolerance=1e-5, check=False, device=device)
-    return np.abs(made.normalized())
+    image = backproject(of_zone(radar, record, zone), grid, tolerance=1e-5, check=False, device=device)
+    return np.abs(image.normalized())

@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -125,7 +124,7 @@ def isolation(radar: RangeZones, apart: int, elevation: float = 0.0) -> float:
     return 20 * float(np.log10(ratio)) if ratio > 1e-12 else -np.inf
 
 
-def _echo(radar: RangeZones, zone: int, scene: Scene, device: Any) -> PhaseHistory:
+def _echo(radar: RangeZones, zone: int, scene: Scene, device: DeviceChoice | None) -> PhaseHistory:
     """Echoes of one zone, delays and phases from its own centre, element by element."""
     chirp = Waveform.chirp(center=radar.center, bandwidth=radar.bandwidth, duration=1e-5)
     return echo(

@@ -27,7 +27,7 @@ ABOUT = (
     "SARAS computes the raw signal of a terrain that is described by plane facets: electromagnetic reflection of every "
     "facet, statistics of heights and of roughness within facets, layover and shadow. This page computes the paper's "
     "scenes with sarcl and compares the images with the printed figures and tables. Source: " + PAPERS["saras"] + "."
-)  # fmt: skip
+)
 TERMS = (
     ("facet", "A plane triangle or rectangle, larger than the wavelength and smaller than a resolution cell."),
     ("null", "Distance from the peak of the response of a point to its first zero, m; the size of a resolution cell."),

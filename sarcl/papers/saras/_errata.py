@@ -89,7 +89,6 @@ def _transfer_function(out: Section) -> None:
 
     measured = float(np.angle(transformed(BAND_EDGE) / transformed(0.0)))
     change = XI**2 / (4 * A2) * (1 / (1 + EPS * BAND_EDGE / (2 * B2)) - 1)
-    out.number(
-        "range-azimuth coupling at the edge of the band, xi 60", "equation 27", -change, measured, 0.02, "rad",
-        why=f"both azimuth terms have the wrong sign; with the other one {change:.3f} rad", cause="error in print",
-    )  # fmt: skip
+    item = "range-azimuth coupling at the edge of the band, xi 60"
+    why = f"both azimuth terms have the wrong sign; with the other one {change:.3f} rad"
+    out.number(item, "equation 27", -change, measured, 0.02, "rad", why=why, cause="error in print")

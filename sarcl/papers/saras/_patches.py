@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
-from ...figures import html
 from ...model.phase_history import PhaseHistory
 from ...scattering.physical_optics import fresnel
 from ...scene.material import Diagram, Material
@@ -61,34 +60,39 @@ def section(lab: Lab) -> Section:
         pixels = radar.focus(raw, grid, device=lab.device)
         clean = np.abs(radar.focus(raw, grid, window="hamming", device=lab.device)) ** 2
         mean[name] = np.array([clean[cells].mean() for cells in inner])
-        found = speckle(pixels[inner[0]])
+        statistics = speckle(pixels[inner[0]])
         amplitude = np.abs(pixels[inner[0]])
         # The intensities of Rayleigh amplitudes are exponential: n of them have a contrast of 1 +- 1/sqrt(n)
-        sigmas = float((found.contrast - 1) * np.sqrt(len(amplitude)))
+        sigmas = float((statistics.contrast - 1) * np.sqrt(len(amplitude)))
         rejected = [
-            text for text, is_rejected in (
+            text
+            for text, is_rejected in (
                 (f"its contrast, {abs(sigmas):.0f} standard errors from 1", abs(sigmas) > STANDARD_ERRORS),
-                (f"the {TEST}", found.rayleigh <= SIGNIFICANT),
-            ) if is_rejected
-        ]  # fmt: skip
+                (f"the {TEST}", statistics.rayleigh <= SIGNIFICANT),
+            )
+            if is_rejected
+        ]
         verdict = f"Rayleigh rejected by {' and by '.join(rejected)}" if rejected else "Rayleigh not rejected"
         out.states(
-            f"case {name}, {case.words}: grey levels", f"figure 12 {name}",
+            f"case {name}, {case.words}: grey levels",
+            f"figure 12 {name}",
             "Rayleigh" if case.rayleigh else "not Rayleigh",
-            f"{verdict}: contrast {found.contrast:.2f}, p = {found.rayleigh:.2g}, {len(amplitude)} pixels",
-            (not rejected) == case.rayleigh, value=[found.rayleigh, found.contrast],
+            f"{verdict}: contrast {statistics.contrast:.2f}, p = {statistics.rayleigh:.2g}, {len(amplitude)} pixels",
+            (not rejected) == case.rayleigh,
+            value=[statistics.rayleigh, statistics.contrast],
             rule=f"Rayleigh is rejected by p of at most {SIGNIFICANT:g} ({TEST}), or by a contrast more than "
             f"{STANDARD_ERRORS:g} standard errors, 1/sqrt(n) for n pixels, from 1",
-        )  # fmt: skip
-        at, density = histogram(amplitude / np.sqrt((amplitude**2).mean()), 3.0, 16)
-        out.draw(
-            picture(clean, grid, f"Figure 12 {name}: {case.words}. Hamming window.", -25.0),
-            html.plot(
-                [(f"case {name}", at, density), ("Rayleigh", at, rayleigh(at))], "amplitude over its root mean square",
-                "density", f"Grey levels of the lower left patch in case {name} (histogram of figure 12 {name}), "
-                f"{len(amplitude)} pixels, without a window.", dots=[f"case {name}"],
-            ),
-        )  # fmt: skip
+        )
+        bins, density = histogram(amplitude / np.sqrt((amplitude**2).mean()), 3.0, 16)
+        out.draw(picture(clean, grid, f"Figure 12 {name}: {case.words}. Hamming window.", -25.0))
+        out.plot(
+            [(f"case {name}", bins, density), ("Rayleigh", bins, rayleigh(bins))],
+            "amplitude over its root mean square",
+            "density",
+            f"Grey levels of the lower left patch in case {name} (histogram of figure 12 {name}), "
+            f"{len(amplitude)} pixels, without a window.",
+            dots=[f"case {name}"],
+        )
     out.say(
         "Patches differ in permittivity (1 to 40) and conductivity (1e-4 to 1 S/m); the paper gives the ranges alone. "
         "The patch of permittivity 1 reflects nothing and is black. Facets per resolution cell: 4 x 4, in case c 16 "
@@ -113,9 +117,7 @@ def _echoes(lab: Lab, radar: FarRadar, case: Case, number: np.ndarray, materials
             y, (-half[1], half[1]), fine.shape, material=fine, materials=materials,
             point_roughness=case.sigma * SPEED_OF_LIGHT / radar.center,
         )  # fmt: skip
-        raw = radar.echo(
-            scene, seed=seed, reference=(0, 0, 0), range_window=(-deep, deep), device=lab.device
-        )  # fmt: skip
+        raw = radar.echo(scene, seed=seed, reference=(0, 0, 0), range_window=(-deep, deep), device=lab.device)
         total = raw if total is None else replace(raw, samples=np.asarray(raw.samples) + np.asarray(total.samples))
         first += len(strip)
     assert total is not None
@@ -132,11 +134,10 @@ def _brightness(out: Section, mean: dict[str, np.ndarray], reflected: np.ndarray
         np.std(ratio) < 1.0, value=float(np.std(ratio)), rule="rms below 1 dB", basis="theory",
     )  # fmt: skip
     level = float(10 * np.log10(np.median(mean["d"][bright] / mean["b"][bright])))
-    out.states(
-        "case d: power of the patches without statistics", "figure 12 d", "no random grey levels",
-        f"{-level:.0f} dB below case b: flat patches reflect away from the radar, and only their edges are seen",
-        level < -40, value=level, rule="more than 40 dB below case b",
-    )  # fmt: skip
+    item = "case d: power of the patches without statistics"
+    measured = f"{-level:.0f} dB below case b: flat patches reflect away from the radar, and only their edges are seen"
+    rule = "more than 40 dB below case b"
+    out.states(item, "figure 12 d", "no random grey levels", measured, level < -40, value=level, rule=rule)
 
 
 def patches(field: tuple[int, int]) -> tuple[np.ndarray, list[tuple[float, float]]]:

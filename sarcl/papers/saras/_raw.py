@@ -10,7 +10,6 @@ import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.errors import SarclWarning
-from ...figures import html
 from ...imaging.compress import compress
 from ...imaging.range_doppler.range_doppler import range_doppler
 from ...model import pointing
@@ -53,19 +52,18 @@ def figure_9(lab: Lab) -> Section:
     raw, direct = (make(scene, CHIRP, track, tolerance=1e-2, **options) for make in (spectral_echo, echo))
     paper = spectral_echo(scene, CHIRP, track, variant="saras", tolerance=PAPER_TOLERANCE, **options)
     apart, of_paper = (_apart(made, direct) for made in (raw, paper))
-    out.states(
-        "raw signal by Fourier transforms and by the sum over facets and pulses", "section IV", "the same signal",
-        f"differ by {apart:.1e}", apart < 2e-2, value=apart, rule="below 2e-2, the tolerances of both together",
-        basis="theory",
-    )  # fmt: skip
+    item = "raw signal by Fourier transforms and by the sum over facets and pulses"
+    measured = f"differ by {apart:.1e}"
+    rule = "below 2e-2, the tolerances of both together"
+    out.states(item, "section IV", "the same signal", measured, apart < 2e-2, value=apart, rule=rule, basis="theory")
     footprint = WIDTH * np.hypot(HEIGHT, DISTANCE)
     order = SPEED_OF_LIGHT / CHIRP.center * np.hypot(HEIGHT, DISTANCE) / (2 * np.pi * footprint**2)
-    out.states(
-        "error of the paper's transfer function, by stationary phase", "equations 26 to 36, footnote 2",
-        f"of the order of lambda R0/(2 pi X^2), {order:.1e} here", f"{of_paper:.1e}", order / 5 < of_paper < 5 * order,
-        "by sarcl.spectral_echo(variant='saras'), against the sum over facets and pulses", of_paper,
-        rule="within a factor of 5",
-    )  # fmt: skip
+    item = "error of the paper's transfer function, by stationary phase"
+    source = "equations 26 to 36, footnote 2"
+    expected = f"of the order of lambda R0/(2 pi X^2), {order:.1e} here"
+    why = "by sarcl.spectral_echo(variant='saras'), against the sum over facets and pulses"
+    rule = "within a factor of 5"
+    out.states(item, source, expected, f"{of_paper:.1e}", order / 5 < of_paper < 5 * order, why, of_paper, rule=rule)
     _show_raw(out, raw, window)
     _show_image(out, lab, raw, track)
     out.say(
@@ -101,12 +99,12 @@ def _show_raw(out: Section, raw: PhaseHistory, window: float) -> None:
     rows = np.abs(azimuth) < SIDE / 2 + WIDTH * np.hypot(HEIGHT, DISTANCE) / 2
     real = signal.real[np.ix_(rows, columns)] / np.abs(signal).max()
     top = float(np.percentile(np.abs(real), 99))
-    out.draw(html.picture(
+    out.picture(
         np.clip(real, -top, top), _edges(ranges[columns]), _edges(azimuth[rows]),
         "slant range from the middle, m", "azimuth of the antenna, m",
         "Real part of the raw signal, before range compression (figure 9).", floor_db=-2 * top,
         unit="of the largest modulus", equal=True,
-    ))  # fmt: skip
+    )  # fmt: skip
 
 
 def _show_image(out: Section, lab: Lab, raw: PhaseHistory, track: Trajectory) -> None:
@@ -124,16 +122,14 @@ def _show_image(out: Section, lab: Lab, raw: PhaseHistory, track: Trajectory) ->
     profile = power[np.abs(azimuth) < 2].mean(axis=0)
     front = -CONE[0] * float(np.sin(LOOK))  # the whole line from foot to tip lies at one range
     cell = SPEED_OF_LIGHT / 2 / CHIRP.bandwidth
-    out.number(
-        "brightest slant range of the cone in the range-Doppler image", "figure 10", front,
-        float(ranges[profile.argmax()]), 1.5 * cell, "m", ".1f", basis="geometry",
-    )  # fmt: skip
-    out.draw(html.picture(
+    item = "brightest slant range of the cone in the range-Doppler image"
+    out.number(item, "figure 10", front, float(ranges[profile.argmax()]), 1.5 * cell, "m", ".1f", basis="geometry")
+    out.picture(
         10 * np.log10(np.maximum(power / np.median(power), 1e-9)), _edges(ranges), _edges(azimuth),
         "slant range from the middle, m", "azimuth, m",
         "Range-Doppler image of this raw signal, relative to the median (figure 10).", floor_db=-30.0,
         percentile=99.5, equal=True,
-    ))  # fmt: skip
+    )  # fmt: skip
 
 
 def _edges(middles: np.ndarray) -> tuple[float, float]:
@@ -149,16 +145,14 @@ def times(lab: Lab) -> Section:
     rows, worst = [], 0.0
     for cells in (1, 2, 3, 4):
         side = n * STEP / 2
-        scene = ground(
-            (-side, side), (DISTANCE - side, DISTANCE + side), (cells * n, cells * n), material=ROUGH
-        )  # fmt: skip
+        scene = ground((-side, side), (DISTANCE - side, DISTANCE + side), (cells * n, cells * n), material=ROUGH)
         options: dict[str, Any] = {
             "antenna": ANTENNA,
             "tolerance": RAW_TOLERANCE,
             "max_edge": None,
             "device": lab.device,
         }
-        found = []
+        results = []
         for generator in (spectral_echo, echo):
             start = time.perf_counter()
             with warnings.catch_warnings():  # one facet per pixel is too few for speckle, and the paper's choice
@@ -167,21 +161,33 @@ def times(lab: Lab) -> Section:
             report = raw.report
             assert report is not None and report.measured_error is not None
             seconds = time.perf_counter() - start - report.seconds.get("check", 0.0)
-            found += [seconds, report.measured_error]
+            results += [seconds, report.measured_error]
         square = cells * cells
-        rows.append([str(square), str(VAX[square]), f"{found[0]:.1f}", f"{found[1]:.1e}", f"{found[2]:.1f}",
-                     f"{found[3]:.1e}"])  # fmt: skip
-        out.keep(**{f"{square} facets per pixel: seconds and errors": found})
-        worst = max(worst, found[1], found[3])
-    out.parts.append(html.table(
-        ["facets per pixel", "VAX, 512 x 512, s", "Fourier transforms, s", "error", "sum, s", "error"], rows,
+        rows.append(
+            [
+                str(square),
+                str(VAX[square]),
+                f"{results[0]:.1f}",
+                f"{results[1]:.1e}",
+                f"{results[2]:.1f}",
+                f"{results[3]:.1e}",
+            ]
+        )
+        out.keep(**{f"{square} facets per pixel: seconds and errors": results})
+        worst = max(worst, results[1], results[3])
+    caption = (
         "Seconds on the device of this run, scene included, and the measured error against the exact sum (random "
-        "samples of the raw signal, recomputed in double precision facet by facet).",
-    ))  # fmt: skip
+        "samples of the raw signal, recomputed in double precision facet by facet)."
+    )
+    out.table(
+        ["facets per pixel", "VAX, 512 x 512, s", "Fourier transforms, s", "error", "sum, s", "error"], rows, caption
+    )
+    item = "largest error of the timed raw signals"
+    expected = f"below the tolerance, {RAW_TOLERANCE:g}"
+    rule = f"at most {RAW_TOLERANCE:g}"
     out.states(
-        "largest error of the timed raw signals", "section V", f"below the tolerance, {RAW_TOLERANCE:g}",
-        f"{worst:.1e}", worst <= RAW_TOLERANCE, value=worst, rule=f"at most {RAW_TOLERANCE:g}", basis="theory",
-    )  # fmt: skip
+        item, "section V", expected, f"{worst:.1e}", worst <= RAW_TOLERANCE, value=worst, rule=rule, basis="theory"
+    )
     out.say(
         "A pixel is 0.8 m on the ground; a facet of the paper is a square, of which sarcl makes two triangles. The sum "
         "over facets and pulses grows with their product; the time of the Fourier transforms grows with the number of "

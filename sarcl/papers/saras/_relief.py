@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...figures import html
 from ...model.phase_history import PhaseHistory
 from ...scattering.physical_optics import fresnel
 from ...scene import shapes
@@ -40,11 +39,9 @@ def parallelepiped(lab: Lab) -> Section:
     dark = (y < width - inside[0]) & (x > ends[0] + inside[1]) & (x < ends[1] - inside[1])
     lit = power[(x > ends[1] + inside[1]) & (x < 42)].mean()
     level = float(10 * np.log10(power[dark].mean() / lit))
-    out.states(
-        "power in the shadow", FIGURE, "free of speckle", f"{level:.0f} dB of the ground beside it", level < -60,
-        "side lobes of the ground around it: the image has a Taylor window of -90 dB", level,
-        rule="below -60 dB",
-    )  # fmt: skip
+    measured = f"{level:.0f} dB of the ground beside it"
+    why = "side lobes of the ground around it: the image has a Taylor window of -90 dB"
+    out.states("power in the shadow", FIGURE, "free of speckle", measured, level < -60, why, level, rule="below -60 dB")
     _edges(out, lab, raw, ends, (depth, width, height))
     return out
 
@@ -52,7 +49,7 @@ def parallelepiped(lab: Lab) -> Section:
 def _edges(
     out: Section, lab: Lab, raw: PhaseHistory, ends: tuple[float, float], half: tuple[float, float, float]
 ) -> None:
-    """Where layover begins, and where the dark run begins and ends, on the ground and along slant range."""
+    """Begin of layover, begin and end of the dark run, on the ground and along slant range."""
     depth, width, height = half
     front = -depth - height * COTANGENT
     for plane in ("ground", "slant"):
@@ -61,9 +58,9 @@ def _edges(
         grid = FINE.grid((240, 240), pixels=(4, 4 / scale), **turned)
         power = np.abs(FINE.focus(raw, grid, window="hamming", device=lab.device)) ** 2
         profile = power[np.abs(grid.positions[:, 0, 1]) < width - 4].mean(axis=0)
-        at = (np.arange(240) - 120) * FINE.null[1] * scale / 4
-        lit = profile[at > ends[1] * scale + 4].mean()
-        first, last = crossings(profile, at, lit / 2)
+        places = (np.arange(240) - 120) * FINE.null[1] * scale / 4
+        lit = profile[places > ends[1] * scale + 4].mean()
+        first, last = crossings(profile, places, lit / 2)
         within = 0.5 * FINE.null[1] * scale
         for name, wanted, found in (("begins", ends[0], first), ("ends", ends[1], last)):
             out.number(
@@ -74,16 +71,18 @@ def _edges(
             0.7 * FINE.null[1] * scale, "m", ".2f", basis="geometry",
         )  # fmt: skip
         if plane == "ground":
-            over = profile[(at > front + 2) & (at < -depth - 2)].mean()
-            before = profile[(at > front - 15) & (at < front - 2)].mean()
-            near = at < front + 3
-            start = crossings(profile[near], at[near], (before + over) / 2)[1]
+            over = profile[(places > front + 2) & (places < -depth - 2)].mean()
+            before = profile[(places > front - 15) & (places < front - 2)].mean()
+            near = places < front + 3
+            start = crossings(profile[near], places[near], (before + over) / 2)[1]
             out.number("layover begins", FIGURE, front, start, FINE.null[1], "m", ".2f", basis="geometry")
-            out.draw(html.plot(
-                [("mean over azimuth", at, 10 * np.log10(profile / lit))], "ground range, m", "dB over the ground",
+            out.plot(
+                [("mean over azimuth", places, 10 * np.log10(profile / lit))],
+                "ground range, m",
+                "dB over the ground",
                 "Profile across the parallelepiped, mean over azimuth: layover, then shadow, which the side lobes of a "
                 "Hamming window fill to about -33 dB.",
-            ))  # fmt: skip
+            )
     out.say(
         f"The paper gives no dimensions. The solid is {2 * depth:g} m deep, {2 * width:g} m wide and {height:g} m high "
         f"here, seen {np.degrees(FINE.look):.0f} deg off the vertical, and the values marked geometry follow from "
@@ -116,28 +115,26 @@ def cone(lab: Lab) -> Section:
     x = grid.positions[0, :, 0]
     peak = mean[:2, middle].mean(axis=1).max(axis=1)
     apart = float(10 * np.log10(peak[1] / peak[0]))
-    out.states(
-        "VV over HH where the cone faces the radar", "figures 14 and 15", "no marked differences", f"{apart:.1f} dB",
-        abs(apart) < 1, value=apart, rule="within 1 dB",
-    )  # fmt: skip
+    item = "VV over HH where the cone faces the radar"
+    expected = "no marked differences"
+    out.states(item, "figures 14 and 15", expected, f"{apart:.1f} dB", abs(apart) < 1, value=apart, rule="within 1 dB")
     beside = mean[:2][:, y < 20][:, :, x > 40].mean(axis=(1, 2))
     flat_apart = float(10 * np.log10(beside[1] / beside[0]))
     cosine = np.array(np.cos(RADAR.look))
     h, v = fresnel(cosine, np.array(ROUGH.permittivity(RADAR.center)))
-    out.number(
-        "VV over HH on flat ground", "equations A.7, A.13, A.15", float(20 * np.log10(abs(v / h))), flat_apart, 1.0,
-        "dB", ".1f", basis="theory",
-    )  # fmt: skip
+    item = "VV over HH on flat ground"
+    source = "equations A.7, A.13, A.15"
+    out.number(item, source, float(20 * np.log10(abs(v / h))), flat_apart, 1.0, "dB", ".1f", basis="theory")
     out.say(
         "HH and VV agree where the cone faces the radar. The flat ground is much darker in VV, as Fresnel's "
         "coefficients say; the printed figures do not show it, because each has a grey scale of its own."
     )
     samples = RADAR.echo(flat, polarization=POLARIZATIONS, device=lab.device).samples
     hh, hv = (float(np.linalg.norm(np.asarray(samples)[i::3])) for i in (0, 2))
+    measured = f"{hv / hh:.1g} of HH's amplitude"
     out.states(
-        "HV of flat ground", "figure 16", "no return", f"{hv / hh:.1g} of HH's amplitude", hv < 1e-5 * hh,
-        value=hv / hh, rule="below 1e-5 of HH",
-    )  # fmt: skip
+        "HV of flat ground", "figure 16", "no return", measured, hv < 1e-5 * hh, value=hv / hh, rule="below 1e-5 of HH"
+    )
     return out
 
 

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import brentq
 
-from ...figures import html
 from ...model.image_grid import ImageGrid
 from ...model.phase_history import PhaseHistory
 from ...scene.scene import Scene
@@ -43,30 +42,29 @@ def section(lab: Lab) -> Section:
     pixels = image[2:-2, 2:-2]
     _distributions(out, pixels)
     amplitude = np.abs(pixels.ravel()) / np.sqrt((np.abs(pixels) ** 2).mean())
-    at, density = histogram(amplitude, 3.0)
-    out.draw(
-        picture(np.abs(image) ** 2, shown, "Flat homogeneous ground (figure 5)."),
-        html.plot(
-            [("image", at, density), ("Rayleigh", at, rayleigh(at))], "amplitude over its root mean square", "density",
-            "Grey levels of the image (figure 6).", dots=["image"],
-        ),
-    )  # fmt: skip
+    levels, density = histogram(amplitude, 3.0)
+    out.draw(picture(np.abs(image) ** 2, shown, "Flat homogeneous ground (figure 5)."))
+    x_name = "amplitude over its root mean square"
+    caption = "Grey levels of the image (figure 6)."
+    out.plot(
+        [("image", levels, density), ("Rayleigh", levels, rayleigh(levels))], x_name, "density", caption, dots=["image"]
+    )
     _correlations(out, lab, radar, raw, n)
     return out
 
 
 def _distributions(out: Section, pixels: np.ndarray) -> None:
     """Figure 6: amplitude, phase and intensity of independent pixels."""
-    found = speckle(pixels)
+    noise = speckle(pixels)
     for item, source, law, p in (
-        ("amplitudes of the image", "figure 6", "Rayleigh", found.rayleigh),
-        ("phases of the image", "section III", "uniform", found.uniform),
+        ("amplitudes of the image", "figure 6", "Rayleigh", noise.rayleigh),
+        ("phases of the image", "section III", "uniform", noise.uniform),
     ):
         out.states(item, source, law, tested(p), p > SIGNIFICANT, value=p, rule=f"{TEST}: p above {SIGNIFICANT:g}")
     error = 1 / np.sqrt(pixels.size)  # of the contrast of so many exponential intensities
     out.number(
-        "standard deviation of the intensity over its mean", "figure 6: of Rayleigh amplitudes", 1.0, found.contrast,
-        4 * error, why="" if abs(found.contrast - 1) <= 4 * error else "more than four standard errors off",
+        "standard deviation of the intensity over its mean", "figure 6: of Rayleigh amplitudes", 1.0, noise.contrast,
+        4 * error, why="" if abs(noise.contrast - 1) <= 4 * error else "more than four standard errors off",
         basis="theory",
     )  # fmt: skip
     of_intensity = speckle(np.abs(pixels) ** 2 + 0j).rayleigh
@@ -92,10 +90,11 @@ def _correlations(out: Section, lab: Lab, radar: FarRadar, raw: PhaseHistory, n:
             out.number(f"autocorrelation, lag {lag} in {name}", "table I", printed[lag], float(found[lag]), within,
                        form=".2f", why="the size of a pixel was chosen by this lag" if lag == 1 else "")  # fmt: skip
     apart = float(np.abs(table - TABLE).max())
+    item = "autocorrelation at all 25 lags"
+    measured = f"differs by up to {apart:.2f}"
     out.states(
-        "autocorrelation at all 25 lags", "table I", "the 25 values of the table", f"differs by up to {apart:.2f}",
-        apart < 0.06, value=apart, rule="difference below 0.06",
-    )  # fmt: skip
+        item, "table I", "the 25 values of the table", measured, apart < 0.06, value=apart, rule="difference below 0.06"
+    )
     out.say(
         "The paper does not give the size of a pixel. It follows from the two lags of one pixel: the response of a "
         f"flat spectrum is sinc(distance/null), and 0.51 and 0.70 are those at {size[0]:.2f} nulls in azimuth and "
@@ -103,9 +102,9 @@ def _correlations(out: Section, lab: Lab, radar: FarRadar, raw: PhaseHistory, n:
         f"{1 / np.sqrt(np.prod(shape) * np.prod(size)):.3f} with {shape[0]} x {shape[1]} pixels."
     )
     rows = [[str(i), *(f"{a:.2f} / {b:.2f}" for a, b in zip(TABLE[i], table[i], strict=True))] for i in range(5)]
-    out.parts.append(html.table(
+    out.table(
         ["range lag", *(f"azimuth lag {i}" for i in range(5))], rows, "Table I: printed / measured autocorrelation."
-    ))  # fmt: skip
+    )
     grid = radar.grid((n[0] - 8, FINE * (n[1] - 8)), (1, FINE))
     fine = radar.focus(raw, grid, device=lab.device)
     lags = np.arange(4 * FINE + 1)
@@ -114,14 +113,15 @@ def _correlations(out: Section, lab: Lab, radar: FarRadar, raw: PhaseHistory, n:
     places = np.column_stack([lags / FINE * radar.null[1], np.zeros((len(lags), 2))])
     response = np.abs(radar.focus(point, ImageGrid.points(places), device=lab.device))
     off = float(np.abs(curve - response).max())
-    out.states(
-        "autocorrelation along range and the response of a point", "figure 7", "coincident",
-        f"differ by up to {off:.3f}", off < 0.05, value=off, rule="at most 0.05 of the peak over the whole curve",
-    )  # fmt: skip
-    out.draw(html.plot(
+    item = "autocorrelation along range and the response of a point"
+    rule = "at most 0.05 of the peak over the whole curve"
+    out.states(item, "figure 7", "coincident", f"differ by up to {off:.3f}", off < 0.05, value=off, rule=rule)
+    out.plot(
         [("autocorrelation of the image", lags / FINE, curve), ("response of a point", lags / FINE, response)],
-        "distance in range, nulls", "modulus", "Range section of the image's autocorrelation (figure 7).",
-    ))  # fmt: skip
+        "distance in range, nulls",
+        "modulus",
+        "Range section of the image's autocorrelation (figure 7).",
+    )
     out.keep(table=table, pixel_in_nulls=size, curve=curve, response=response)
 
 

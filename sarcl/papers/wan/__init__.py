@@ -26,14 +26,14 @@ ABOUT = (
     "The paper simulates the raw data of a spaceborne radar: an elliptical orbit, a rotating ellipsoidal Earth, and "
     "ground of plane facets with Gaussian heights. This page computes its scenes with sarcl and compares the images "
     "with the printed figures. Source: " + PAPERS["wan"] + " (in Chinese)."
-)  # fmt: skip
+)
 TERMS = (
     ("coefficient", "Amplitude that a facet, or all facets of a resolution cell, send back."),
     ("roughness", "Standard deviation of the Gaussian heights of the corners of facets, m."),
     ("permittivity", "Relative permittivity of the ground."),
     ("contrast", "Standard deviation of the intensity over its mean; 1 for fully developed speckle."),
     ("rank correlation", "Spearman's: 1 where a quantity always grows with another, -1 where it always falls."),
-)  # fmt: skip
+)
 
 PAPER = Paper(
     name="wan",

@@ -35,20 +35,16 @@ def section(lab: Lab) -> Section:
     high = np.tan(TILT)
     square = np.array([[[0, 0, 0], [1, 0, high], [0, 1, 0]], [[1, 0, high], [1, 1, high], [0, 1, 0]]])
     area = float(normals_and_areas(square)[1].sum())
-    out.number(
-        "area of a facet of 1 m x 1 m on the ground, alpha 70 deg", "section 3.2", float(1 / np.cos(TILT)), area, 1e-6,
-        "m^2", basis="geometry",
-    )  # fmt: skip
+    item = "area of a facet of 1 m x 1 m on the ground, alpha 70 deg"
+    out.number(item, "section 3.2", float(1 / np.cos(TILT)), area, 1e-6, "m^2", basis="geometry")
     radar = l_band(4)
     options = {"reference": (0, 0, 0), "range_window": (-20.0, 20.0), "device": lab.device}
-    here, farther = (
-        np.asarray(radar.echo(Scene.points([-r * radar.up]), **options).samples) for r in (0.0, FARTHER)
-    )  # fmt: skip
-    middle = here.shape[1] // 2
+    near, farther = (np.asarray(radar.echo(Scene.points([-r * radar.up]), **options).samples) for r in (0.0, FARTHER))
+    middle = near.shape[1] // 2
     wave = SPEED_OF_LIGHT / radar.center
     out.number(
         "phase of an echo from 0.02 m farther, L band", "section 4", -2 * np.pi * FARTHER / wave,
-        float(np.angle(farther[2, middle] / here[2, middle])), 0.02, "rad", why="the path is travelled twice",
+        float(np.angle(farther[2, middle] / near[2, middle])), 0.02, "rad", why="the path is travelled twice",
         cause="error in print",
     )  # fmt: skip
     return out

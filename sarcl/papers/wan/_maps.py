@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from ...opencl.device import DeviceChoice
 from ...scattering.facets import FacetSet
 from ...scene.scene import Scene
 from ...visibility.illumination import lit
@@ -24,7 +23,9 @@ def cut(scene: Scene, edge: float) -> Scene:
     )
 
 
-def backscatter(scene: Scene, position: np.ndarray, up: np.ndarray, frequency: float, device: Any) -> np.ndarray:
+def backscatter(
+    scene: Scene, position: np.ndarray, up: np.ndarray, frequency: float, device: DeviceChoice | None
+) -> np.ndarray:
     """Expected power of each facet in HH towards an antenna at `position`, m (3,), over its lit share, m^2 (k,).
 
     up  (3,), unit vector: V lies in a plane with it;  frequency  Hz

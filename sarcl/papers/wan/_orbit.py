@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from ...base import wgs84
-from ...figures import html
 from ...imaging.backproject import backproject
 from ...imaging.range_doppler.range_doppler import range_doppler
 from ...model.image_grid import ImageGrid
@@ -61,10 +60,10 @@ def section(lab: Lab) -> Section:
             first, drawn = range_doppler(raw, side="right", check=True, **options), scene
     assert first is not None and first.report is not None and first.report.measured_error is not None
     apart = float(first.report.measured_error)
-    out.states(
-        "range-Doppler image and backprojection of the same echoes", "figure 8", "the same image",
-        f"differ by {apart:.1e}", apart < 1e-2, value=apart, rule="below the tolerance of 1e-2", basis="theory",
-    )  # fmt: skip
+    item = "range-Doppler image and backprojection of the same echoes"
+    measured = f"differ by {apart:.1e}"
+    rule = "below the tolerance of 1e-2"
+    out.states(item, "figure 8", "the same image", measured, apart < 1e-2, value=apart, rule=rule, basis="theory")
     local = (np.asarray(first.grid.positions) - origin) @ axes.T
     _shadow(out, power, grid, float(np.tan(seen.incidence)))
     rate = float(seen.doppler_rate(CHIRP.center))
@@ -75,20 +74,20 @@ def section(lab: Lab) -> Section:
         f"largest solid is {2 * SCALE * FOOT[0]:.0f} m wide here, because the resolution is 4 m in slant range."
     )
     half = SCALE * SIDES[0], SCALE * SIDES[1]
-    out.draw(html.picture(
+    out.picture(
         _db(power), (-half[1], half[1]), (-half[0], half[0]), "ground range, m", "azimuth, m",
         f"Backprojected on the ground: mean of {LOOKS[lab.quick]} looks (figure 6).", floor_db=-30.0,
         percentile=99.5, equal=True,
-    ))  # fmt: skip
+    )  # fmt: skip
     rows = np.abs(local[:, local.shape[1] // 2, 1]) < half[0]
     columns = np.abs(local[local.shape[0] // 2, :, 0]) < half[1]
     image = np.abs(np.asarray(first.data)[rows][:, columns]) ** 2
     along, across = local[rows, local.shape[1] // 2, 1], local[local.shape[0] // 2, columns, 0]
     _maps_of_cells(out, lab, orbit, axes, origin, drawn, image, (along, across))
-    out.draw(html.picture(
+    out.picture(
         _db(image), (across[0], across[-1]), (along[0], along[-1]), "ground range of the slant range, m", "azimuth, m",
         "Range-Doppler image, one look (figure 8).", floor_db=-30.0, percentile=99.5, equal=True,
-    ))  # fmt: skip
+    )  # fmt: skip
     return out
 
 
@@ -111,14 +110,14 @@ def _maps_of_cells(
     along, across = ((middles - origin) @ axes[i] for i in (1, 0))
     ground_map = summed(power, along, across, (_edges(ground_places[0]), _edges(ground_places[1])))
     ends = [(float(places[0]), float(places[-1])) for places in ground_places]
-    for cells, caption, name in (
+    for cells, plane, name in (
         (ground_map, "on the ground", "ground range, m"),
         (slant_map, "in the slant plane: foreshortening and layover", "ground range of the slant range, m"),
     ):
-        out.draw(html.picture(
-            _db(cells), ends[1], ends[0], name, "azimuth, m", f"Power of the facets in cells {caption} (figure 7).",
-            floor_db=-30.0, percentile=99.5, equal=True,
-        ))  # fmt: skip
+        caption = f"Power of the facets in cells {plane} (figure 7)."
+        out.picture(
+            _db(cells), ends[1], ends[0], name, "azimuth, m", caption, floor_db=-30.0, percentile=99.5, equal=True
+        )
     alike, unlike = (correlation(image, cells, AVERAGED) for cells in (slant_map, ground_map))
     out.states(
         "range-Doppler image and the map of the slant plane", "figures 7 and 8", "very close",
@@ -162,7 +161,7 @@ def _scene(axes: np.ndarray, origin: np.ndarray, seed: int) -> Scene:
 
 
 def _shadow(out: Section, power: np.ndarray, grid: ImageGrid, tangent: float) -> None:
-    """Where the shadow of the cylinder ends behind the frustum."""
+    """End of the cylinder's shadow behind the frustum."""
     assert grid.spacing is not None
     x = (np.arange(grid.shape[1]) - grid.shape[1] // 2) * grid.spacing[1]
     y = (np.arange(grid.shape[0]) - grid.shape[0] // 2) * grid.spacing[0]
@@ -171,12 +170,10 @@ def _shadow(out: Section, power: np.ndarray, grid: ImageGrid, tangent: float) ->
     lit = profile[(x > end + 60) & (x < SCALE * SIDES[1] - 20)].mean()
     below = profile < lit / 2
     inside = np.flatnonzero(below & (x < end + 30))
-    found = float(x[inside[-1]] + grid.spacing[1] / 2)
-    out.number("end of the cylinder's shadow", "figures 7 and 8", end, found, 12.0, "m", ".0f", basis="geometry")
-    out.draw(html.plot(
-        [("mean over azimuth", x, 10 * np.log10(profile / lit))], "ground range, m", "dB over the ground",
-        "Profile through the solids: layover in front, shadow behind.",
-    ))  # fmt: skip
+    measured_end = float(x[inside[-1]] + grid.spacing[1] / 2)
+    out.number("end of the cylinder's shadow", "figures 7 and 8", end, measured_end, 12.0, "m", ".0f", basis="geometry")
+    caption = "Profile through the solids: layover in front, shadow behind."
+    out.plot([("mean over azimuth", x, 10 * np.log10(profile / lit))], "ground range, m", "dB over the ground", caption)
 
 
 def _db(power: np.ndarray) -> np.ndarray:

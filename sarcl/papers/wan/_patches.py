@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from scipy import stats
 
-from ...figures import html
 from ...scene.material import Material
 from ...scene.scene import Scene
 from ..far_radar import FarRadar, ground
@@ -28,10 +27,9 @@ def section(lab: Lab) -> Section:
     rough = _figure(out, lab, size, n, values(0.16, 0.01), np.full(16, 3.0), "a: roughness rises by 0.01 m from 0.08 m")
     eps = _figure(out, lab, size, n, np.full(16, 0.16), permittivity, "b: permittivity rises by 0.2 from 1.4")
     rise = float(stats.spearmanr(rough, RISING).statistic)
-    out.states(
-        "coefficient as roughness grows", "figure 5 a", "grows", f"grows: rank correlation {rise:.2f}", rise > 0.9,
-        value=rise, rule="rank correlation above 0.9",
-    )  # fmt: skip
+    measured = f"grows: rank correlation {rise:.2f}"
+    rule = "rank correlation above 0.9"
+    out.states("coefficient as roughness grows", "figure 5 a", "grows", measured, rise > 0.9, value=rise, rule=rule)
     fall = float(stats.spearmanr(eps, RISING).statistic)
     out.states(
         "coefficient as permittivity grows", "figure 5 b", "falls", f"grows: rank correlation {fall:.2f}", fall < -0.9,
@@ -43,11 +41,11 @@ def section(lab: Lab) -> Section:
     slope = float(stats.linregress(reflected, 10 * np.log10(eps)).slope)
     out.say(f"In b the brightness follows |R(0)|^2 of Fresnel: {slope:.2f} dB per dB.")
     in_order = np.argsort(RISING)
-    out.draw(html.plot(
+    out.plot(
         [(name, np.arange(1, 17), 10 * np.log10(found[in_order] / found.min()))
          for name, found in (("a: roughness", rough), ("b: permittivity", eps))],
         "place in the order of rising values", "dB over the darkest patch", "Brightness of the 16 patches.",
-    ))  # fmt: skip
+    )  # fmt: skip
     out.keep(roughness=rough, permittivity=eps, slope=slope)
     return out
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...figures import html
 from ...scene.material import Material
 from ..far_radar import ground, speckle
 from ..lab import Lab, histogram, rayleigh
@@ -24,42 +23,37 @@ def section(lab: Lab) -> Section:
     n = CELLS[lab.quick]
     radar = l_band(round(1.3 * n))
     ends = [(-n * null / 2, n * null / 2) for null in radar.null]
-    curves, phases, found = [], [], []
+    curves, phases, statistics = [], [], []
     for side in SIDES:
         cells = [round(n * null / side) for null in radar.null]
         scene = ground(ends[0], ends[1], cells, material=Material(eps_r=EPS), point_roughness=ROUGHNESS)
         raw = radar.echo(scene, shadows=False, seed=1, device=lab.device)
         pixels = radar.focus(raw, radar.grid((n, n)), device=lab.device)[2:-2, 2:-2].ravel()
-        found.append(speckle(pixels))
+        statistics.append(speckle(pixels))
         facets = round(2 * np.prod(cells) / n**2)
         curves.append(
             (f"{facets} facets per cell", *histogram(np.abs(pixels / np.sqrt((np.abs(pixels) ** 2).mean())), 3.0))
         )
-        at, density = histogram(np.angle(pixels) + np.pi, 2 * np.pi, 16)
-        phases.append((f"{facets} facets per cell", at - np.pi, density))
-    many, few = found
+        levels, density = histogram(np.angle(pixels) + np.pi, 2 * np.pi, 16)
+        phases.append((f"{facets} facets per cell", levels - np.pi, density))
+    many, few = statistics
     most = FINITE + CHANCE / np.sqrt(len(pixels))
+    measured = f"distribution differs by {many.difference:.3f}"
+    rule = f"largest difference of distribution functions below {most:.3f}: {FINITE:g}, and what chance allows"
     out.states(
-        "amplitudes", "figure 3 a", "Rayleigh", f"distribution differs by {many.difference:.3f}",
-        many.difference < most, value=many.difference,
-        rule=f"largest difference of distribution functions below {most:.3f}: {FINITE:g}, and what chance allows",
-    )  # fmt: skip
-    out.states(
-        "phases", "figure 3 b", "uniform", f"p = {many.uniform:.2f} that they are", many.uniform > 0.01,
-        value=many.uniform, rule="p above 0.01 in the test of Kolmogorov and Smirnov",
-    )  # fmt: skip
+        "amplitudes", "figure 3 a", "Rayleigh", measured, many.difference < most, value=many.difference, rule=rule
+    )
+    measured = f"p = {many.uniform:.2f} that they are"
+    rule = "p above 0.01 in the test of Kolmogorov and Smirnov"
+    out.states("phases", "figure 3 b", "uniform", measured, many.uniform > 0.01, value=many.uniform, rule=rule)
     out.keep(contrast=many.contrast, contrast_of_few=few.contrast, difference_of_few=few.difference)
-    at = curves[0][1]
-    out.draw(
-        html.plot(
-            [*curves, ("Rayleigh", at, rayleigh(at))], "amplitude over its root mean square", "density",
-            "Amplitudes of the image's resolution cells (figure 3 a).",
-        ),
-        html.plot(
-            [*phases, ("uniform", phases[0][1], np.full(16, 1 / (2 * np.pi)))], "phase, rad", "density",
-            "Phases of the image's resolution cells (figure 3 b).",
-        ),
-    )  # fmt: skip
+    levels = curves[0][1]
+    caption = "Amplitudes of the image's resolution cells (figure 3 a)."
+    out.plot(
+        [*curves, ("Rayleigh", levels, rayleigh(levels))], "amplitude over its root mean square", "density", caption
+    )
+    caption = "Phases of the image's resolution cells (figure 3 b)."
+    out.plot([*phases, ("uniform", phases[0][1], np.full(16, 1 / (2 * np.pi)))], "phase, rad", "density", caption)
     out.say(
         f"Few of the smooth facets face the radar, so that many facets per cell are needed: with {curves[1][0]} the "
         f"contrast is {few.contrast:.2f} instead of 1, with {curves[0][0]} {many.contrast:.2f}. The distribution of "

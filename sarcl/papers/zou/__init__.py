@@ -31,7 +31,7 @@ ABOUT = (
     "grid (FDTD), once, and delays the surface currents that it finds for all other pulses (waveform forming). This "
     "page computes its targets with sarcl.fullwave_echo, which takes several anchors where the tolerance needs them, "
     "and with physical optics (sarcl.echo) on the same meshes. Source: " + PAPERS["zou"] + "."
-)  # fmt: skip
+)
 TERMS = (
     ("HH, VH", "Received and sent polarisation: VH is what is received vertically of what is sent horizontally."),
     ("anchor", "A pulse whose currents are computed on the grid. The paper has one, in the middle of the track."),
@@ -40,7 +40,7 @@ TERMS = (
     ("physical optics", "Currents of every lit facet as on an infinite plane; no edges, no second reflection."),
     ("dB re 1 m²", "Radar cross section of a point as bright as the pixel; of samples, of a point with such an echo."),
     ("Mie's series", "The exact field that a conducting sphere scatters."),
-)  # fmt: skip
+)
 
 PAPER = Paper(
     name="zou",

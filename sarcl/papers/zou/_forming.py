@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...figures import html
 from ..paper import Section
 from ._lab import TOLERANCE, Lab, report_of
 
@@ -36,42 +35,48 @@ def section(lab: Lab) -> Section:
     out = Section("forming", "Waveform forming and one run of the grid per azimuth (figure 8)")
     n, times = len(lab.radar.track), []
     for name in (BRICK, CONE):
-        found = compared(lab, name)
+        errors = compared(lab, name)
         report, plan = report_of(lab.full_wave(name))
-        anchors, one, own = len(plan["anchors"]), *found.totals
+        anchors, one, own = len(plan["anchors"]), *errors.totals
         out.states(
             f"{name}: one anchor against one run per azimuth", "figure 8" if name == BRICK else "section 4",
-            "the difference is not significant", f"differs by {one:.1%}, by up to {found.one.max():.0%} at an azimuth",
+            "the difference is not significant", f"differs by {one:.1%}, by up to {errors.one.max():.0%} at an azimuth",
             one < FINE, "the beam of table 1 reaches 9.6 degrees to either side, where the currents are not those of "
             "the middle", one, rule=f"rms over {N_AZIMUTHS} azimuths below {FINE:.0%}", cause="interpretation",
         )  # fmt: skip
-        out.states(
-            f"{name}: {anchors} anchors against one run per azimuth", "tolerance", f"at most {TOLERANCE:.0%}",
-            f"differs by {own:.1%}, by up to {found.own.max():.0%} at an azimuth", own < TOLERANCE,
-            f"predicted from the anchors alone: {report.predicted_error:.1%}", own,
-            rule=f"rms over {N_AZIMUTHS} azimuths off the anchors below {TOLERANCE:.0%}", basis="theory",
-        )  # fmt: skip
-        degrees = np.degrees(found.angle)
-        out.draw(html.plot(
-            [("one anchor, as in the paper", degrees, _db(found.one)), (f"{anchors} anchors", degrees, _db(found.own))],
-            "azimuth, degrees", "error over the echo, dB",
+        item = f"{name}: {anchors} anchors against one run per azimuth"
+        expected = f"at most {TOLERANCE:.0%}"
+        measured = f"differs by {own:.1%}, by up to {errors.own.max():.0%} at an azimuth"
+        why = f"predicted from the anchors alone: {report.predicted_error:.1%}"
+        rule = f"rms over {N_AZIMUTHS} azimuths off the anchors below {TOLERANCE:.0%}"
+        out.states(item, "tolerance", expected, measured, own < TOLERANCE, why, own, rule=rule, basis="theory")
+        degrees = np.degrees(errors.angle)
+        out.plot(
+            [
+                ("one anchor, as in the paper", degrees, _db(errors.one)),
+                (f"{anchors} anchors", degrees, _db(errors.own)),
+            ],
+            "azimuth, degrees",
+            "error over the echo, dB",
             f"Error of waveform forming at each azimuth, {name}, HH (figure 8).",
-        ))  # fmt: skip
+        )
         own_seconds = sum(report.seconds.values())
         times.append([
-            name, f"{found.seconds[0] * n:.0f}", f"{found.seconds[1]:.1f}", f"{own_seconds:.0f}",
-            f"{found.seconds[0] * n / own_seconds:.0f}",
+            name, f"{errors.seconds[0] * n:.0f}", f"{errors.seconds[1]:.1f}", f"{own_seconds:.0f}",
+            f"{errors.seconds[0] * n / own_seconds:.0f}",
         ])  # fmt: skip
         out.keep(**{name: {
-            "azimuth_deg": degrees, "one_anchor": found.one, "own_anchors": found.own, "totals": found.totals,
-            "seconds_per_azimuth": found.seconds[0], "seconds_one_anchor": found.seconds[1], "anchors": anchors,
+            "azimuth_deg": degrees, "one_anchor": errors.one, "own_anchors": errors.own, "totals": errors.totals,
+            "seconds_per_azimuth": errors.seconds[0], "seconds_one_anchor": errors.seconds[1], "anchors": anchors,
             "seconds_own": own_seconds, "predicted": report.predicted_error,
         }})  # fmt: skip
-    out.draw(html.table(
-        ["target", f"{n} runs, s", "one anchor, s", "several anchors, s", "runs over several anchors"], times,
+    caption = (
         f"Time of all {n} pulses: one run of the grid per azimuth (estimated from {N_AZIMUTHS + 1} runs), one anchor, "
-        "and as many anchors as the tolerance needs, HH and VH.",
-    ))  # fmt: skip
+        "and as many anchors as the tolerance needs, HH and VH."
+    )
+    out.table(
+        ["target", f"{n} runs, s", "one anchor, s", "several anchors, s", "runs over several anchors"], times, caption
+    )
     return out
 
 
@@ -91,20 +96,20 @@ def compared(lab: Lab, name: str) -> Comparison:
     raw = lab.full_wave(name).select(polarization="HH")
     track, n = lab.radar.track, len(lab.radar.track)
     rows = azimuths(n, np.array(report_of(raw)[1]["anchors"]))
-    some = np.union1d(rows, [n // 2])
-    middle = int(np.searchsorted(some, n // 2))
-    picked, seconds, echoes = track.picked(some), [], []
-    for kept, anchors in (("azimuths", list(range(len(some)))), ("one", [middle])):
+    pulses = np.union1d(rows, [n // 2])
+    middle = int(np.searchsorted(pulses, n // 2))
+    picked, seconds, echoes = track.picked(pulses), [], []
+    for kept, anchors in (("azimuths", list(range(len(pulses)))), ("one", [middle])):
         made = lab.run(name, picked, "HH", kept, anchors=anchors, model_error=False)
         seconds.append(sum(report_of(made)[0].seconds.values()))
         echoes.append(np.delete(made.read(0, made.n_rows), middle, axis=0))
     exact, own = echoes[0], raw.read(0, n)[rows]
     norm = np.linalg.norm(exact, axis=1)
-    at = track.positions[rows]
+    positions = track.positions[rows]
     errors = [np.linalg.norm(made - exact, axis=1) for made in (echoes[1], own)]
     return Comparison(
-        np.arctan2(at[:, 1], np.hypot(at[:, 0], at[:, 2])), errors[0] / norm, errors[1] / norm,
-        (_root(errors[0]) / _root(norm), _root(errors[1]) / _root(norm)), (seconds[0] / len(some), seconds[1]),
+        np.arctan2(positions[:, 1], np.hypot(positions[:, 0], positions[:, 2])), errors[0] / norm, errors[1] / norm,
+        (_root(errors[0]) / _root(norm), _root(errors[1]) / _root(norm)), (seconds[0] / len(pulses), seconds[1]),
     )  # fmt: skip
 
 

@@ -40,23 +40,25 @@ def section(name: str, lab: Lab) -> Section:
     for polarization, raw in raws.items():
         field = received(raw, FIELD_RATE, 0.0)
         caption = f"Envelope of the field at the receiver, {polarization} (figure 5 {target.letter})."
-        out.draw(html.picture(
-            _db(np.abs(field.samples)), *_ends(field, raw), DELAY_NAME, SLOW_NAME, caption, floor_db=FLOOR, unit=LEVEL,
-        ))  # fmt: skip
+        out.picture(
+            _db(np.abs(field.samples)), *_ends(field, raw), DELAY_NAME, SLOW_NAME, caption, floor_db=FLOOR, unit=LEVEL
+        )
     records = {polarization: received(raw) for polarization, raw in raws.items()}
     for part, values in (("I", records["HH"].samples.real), ("Q", records["HH"].samples.imag)):
         caption = f"{part} samples, HH, 600 MHz (figure 6 {target.letter})."
-        out.draw(html.picture(
+        out.picture(
             values, *_ends(records["HH"], raws["HH"]), DELAY_NAME, SLOW_NAME, caption,
             floor_db=-2 * float(values.max()), unit="m",
-        ))  # fmt: skip
+        )  # fmt: skip
     view = _View(lab, name)
     chains = {polarization: compress(recorded(records[polarization], raw)) for polarization, raw in raws.items()}
     sampled = {polarization: view.range_doppler(chain) for polarization, chain in chains.items()}
     for polarization, image in sampled.items():
-        out.draw(view.picture(
-            _amplitudes(image), f"{polarization}, range-Doppler image of the samples (figure 7 {target.letter})."
-        ))  # fmt: skip
+        out.draw(
+            view.picture(
+                _amplitudes(image), f"{polarization}, range-Doppler image of the samples (figure 7 {target.letter})."
+            )
+        )
     images = {polarization: np.abs(view.backprojected(raw)) for polarization, raw in raws.items()}
     for polarization, pixels in images.items():
         out.draw(view.picture(pixels, f"{polarization}, backprojection of the echoes."))
@@ -67,12 +69,14 @@ def section(name: str, lab: Lab) -> Section:
     _compare_chain(out, view, name, sampled["HH"], raws["HH"])
     rms = {polarization: float(np.sqrt((np.abs(_samples(raw)) ** 2).mean())) for polarization, raw in raws.items()}
     apart = _samples(raws["HH"]) - _samples(optics)
-    found = Levels(
-        (float(images["HH"].max()), float(images["VH"].max())), (rms["HH"], rms["VH"]), float(flat.max()),
+    levels = Levels(
+        (float(images["HH"].max()), float(images["VH"].max())),
+        (rms["HH"], rms["VH"]),
+        float(flat.max()),
         float(np.sqrt((np.abs(apart) ** 2).mean()) / rms["HH"]),
-    )  # fmt: skip
-    lab.levels[name] = found
-    _say(out, found, both)
+    )
+    lab.levels[name] = levels
+    _say(out, levels, both)
     return out
 
 
@@ -82,10 +86,10 @@ def _draw_waves(out: Section, raw: PhaseHistory) -> None:
     (first, last), _ = _ends(field, raw)
     delay = np.linspace(first, last, field.samples.shape[1])
     rows = (("middle of the track", raw.n_rows // 2), ("beginning", 0))
-    out.draw(html.plot(
-        [(name, delay, field.samples[row].real) for name, row in rows], DELAY_NAME, "field times range, m",
-        "Field of two pulses at the receiver, HH.",
-    ))  # fmt: skip
+    caption = "Field of two pulses at the receiver, HH."
+    out.plot(
+        [(name, delay, field.samples[row].real) for name, row in rows], DELAY_NAME, "field times range, m", caption
+    )
 
 
 def _say(out: Section, found: Levels, both: PhaseHistory) -> None:
@@ -143,13 +147,13 @@ class _View:
 def _compare_chain(out: Section, view: _View, name: str, image: Image, raw: PhaseHistory) -> None:
     """The range-Doppler image of the receiver's samples against backprojection of the echoes."""
     exact = view.backprojected(raw, image.grid)
-    here = np.asarray(image.data) / image.gain
-    apart = float(np.linalg.norm(here - exact) / np.linalg.norm(exact))
-    out.states(
-        f"{name}: range-Doppler image of 600 MHz samples", "figures 6 and 7", "the image of the echoes",
-        f"differs by {apart:.1%} from backprojection of the echoes", apart < CHAIN, value=apart,
-        rule=f"below {CHAIN:.0%}", basis="theory",
-    )  # fmt: skip
+    chain = np.asarray(image.data) / image.gain
+    apart = float(np.linalg.norm(chain - exact) / np.linalg.norm(exact))
+    item = f"{name}: range-Doppler image of 600 MHz samples"
+    expected = "the image of the echoes"
+    measured = f"differs by {apart:.1%} from backprojection of the echoes"
+    rule = f"below {CHAIN:.0%}"
+    out.states(item, "figures 6 and 7", expected, measured, apart < CHAIN, value=apart, rule=rule, basis="theory")
 
 
 def _outline(lab: Lab, name: str) -> list[tuple[str, Any, Any]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -18,6 +18,7 @@ from ...fullwave.echoes.fullwave_echo import fullwave_echo
 from ...model.phase_history import PhaseHistory
 from ...model.store import read
 from ...model.trajectory import Trajectory
+from ...opencl.device import DeviceChoice
 from ...scene.scene import Scene
 from ...simulation.echo import Polarization, echo
 from . import _targets
@@ -51,7 +52,7 @@ class Lab:
     """
 
     def __init__(
-        self, device: Any = None, quick: bool = False, folder: Path | None = None,
+        self, device: DeviceChoice | None = None, quick: bool = False, folder: Path | None = None,
         progress: Callable[[str, int, int], None] | None = None,
     ) -> None:  # fmt: skip
         self.device, self.quick, self.progress = device, quick, progress
@@ -74,7 +75,14 @@ class Lab:
         """HH and VH of a target along the track by full wave, from a file where a full run has finished it."""
         return self.run(name, self.radar.track, BOTH, "track")
 
-    def run(self, name: str, track: Trajectory, polarization: Any, kept: str, **options: Any) -> PhaseHistory:
+    def run(
+        self,
+        name: str,
+        track: Trajectory,
+        polarization: Polarization | Sequence[Polarization],
+        kept: str,
+        **options: Any,
+    ) -> PhaseHistory:
         """Echoes by full wave; kept: what the file of a full run is called beside the name of the target."""
         scene, out = self.scene(name), None
         if self.folder is not None:

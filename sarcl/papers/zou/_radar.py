@@ -45,17 +45,19 @@ class Radar:
         """Positions at the pulses; time 0 is where the origin is passed."""
         n = PULSES // self.reduction
         times = (np.arange(n) - (n - 1) / 2) / PRF
-        at = np.array([-np.sin(INCIDENCE), 0.0, np.cos(INCIDENCE)]) * self.range_
+        middle = np.array([-np.sin(INCIDENCE), 0.0, np.cos(INCIDENCE)]) * self.range_
         velocity = np.array([0.0, SPEED, 0.0])
-        return Trajectory(times, at + times[:, None] * velocity, np.tile(velocity, (n, 1)))
+        return Trajectory(times, middle + times[:, None] * velocity, np.tile(velocity, (n, 1)))
 
     def grid(self, half: tuple[float, float], spacing: float) -> ImageGrid:
         """Pixels in the plane of track and origin: azimuth and slant range from -half to half, m, about the origin."""
         shape = [2 * round(h / spacing) + 1 for h in half]
         return ImageGrid.plane(
-            shape=shape, spacing=spacing, normal=(np.cos(INCIDENCE), 0.0, np.sin(INCIDENCE)),
+            shape=shape,
+            spacing=spacing,
+            normal=(np.cos(INCIDENCE), 0.0, np.sin(INCIDENCE)),
             x_axis=(np.sin(INCIDENCE), 0.0, -np.cos(INCIDENCE)),
-        )  # fmt: skip
+        )
 
     def seen(self, points: np.ndarray) -> np.ndarray:
         """Azimuth and slant range of points (n, 3) about the origin, m (n, 2), as images show them."""
@@ -85,7 +87,7 @@ class Record:
 
 
 def received(raw: PhaseHistory, rate: float = SAMPLING, carrier: float = CENTER) -> Record:
-    """What a receiver samples of the echoes of `CHIRP`, from the compressed echoes: the pulse is put back.
+    """Samples that a receiver takes of the echoes of `CHIRP`, from the compressed echoes: the pulse is put back.
 
     One window of time for all pulses, whatever their range; carrier 0: the field itself, its imaginary part being its
     Hilbert transform.
@@ -113,13 +115,13 @@ def recorded(record: Record, raw: PhaseHistory) -> PhaseHistory:
     The pulse of `received` has the spectrum of `CHIRP` alone, of modulus 1 in the band; a pulse with sharp ends has
     another.
     """
-    found = PhaseHistory.from_time(
+    history = PhaseHistory.from_time(
         record.samples, kind="compressed", rate=record.rate, start=record.start, carrier=record.carrier,
         bandwidth=BANDWIDTH, tx=raw.tx, time=raw.time, tx_velocity=raw.tx_velocity, rx_velocity=raw.rx_velocity,
     )  # fmt: skip
     peak = np.sqrt(DURATION * BANDWIDTH) * np.exp(0.25j * np.pi)  # as in `received`, and BANDWIDTH from_time takes
-    samples = (found.read(0, found.n_rows) / peak).astype(np.complex64)
-    return replace(found, samples=samples, waveform=CHIRP, compressed=False)
+    samples = (history.read(0, history.n_rows) / peak).astype(np.complex64)
+    return replace(history, samples=samples, waveform=CHIRP, compressed=False)
 
 
 def at_pulses(raw: PhaseHistory, samples: np.ndarray) -> PhaseHistory:

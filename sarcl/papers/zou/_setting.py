@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from ...analysis.point_response import PointResponse, measure
-from ...figures import html
 from ...imaging.backproject import backproject
 from ...scene.scene import Scene
 from ...simulation.echo import echo
@@ -39,12 +38,14 @@ def section(lab: Lab) -> Section:
     upper = DOPPLER * (1 + BANDWIDTH / (2 * CHIRP.center))
     _point(out, lab)
     plane = max(_curved(radar.range_, lab.scene(target.name)) for target in _targets.TARGETS)
-    whole = _curved(RANGE, _targets.find("tank").scene())
+    phase = _curved(RANGE, _targets.find("tank").scene())
+    item = "phase error of plane waves at the ends of the tank, equation 4"
+    expected = "approximately a plane wave"
+    why = "equation 4 leaves out r'^2/2r of the distance of a cell; sarcl delays every cell by its own distance"
+    rule = "below 0.1 rad, two ways"
     out.states(
-        "phase error of plane waves at the ends of the tank, equation 4", "section 2.2", "approximately a plane wave",
-        f"{whole:.2f} rad", whole < 0.1, "equation 4 leaves out r'^2/2r of the distance of a cell; sarcl delays every "
-        "cell by its own distance", whole, rule="below 0.1 rad, two ways", cause="interpretation",
-    )  # fmt: skip
+        item, "section 2.2", expected, f"{phase:.2f} rad", phase < 0.1, why, phase, rule=rule, cause="interpretation"
+    )
     out.keep(range_m=radar.range_, pulses=len(radar.track), half_beam_deg=np.degrees(HALF_BEAM), plane_wave_rad=plane)
     size = "" if radar.reduction == 1 else f" This run has targets, range and track of 1/{radar.reduction} of these."
     out.say(
@@ -66,20 +67,18 @@ def _point(out: Section, lab: Lab) -> None:
         reference=(0.0, 0.0, 0.0), tolerance=1e-4, check=False, device=lab.device,
     )  # fmt: skip
     image = backproject(raw, lab.radar.grid((POINT, POINT), SPACING), tolerance=1e-3, check=False, device=lab.device)
-    found = measure(image, near=(0.0, 0.0, 0.0))
-    assert isinstance(found, PointResponse)
+    response = measure(image, near=(0.0, 0.0, 0.0))
+    assert isinstance(response, PointResponse)
     for name, width, printed in zip(
-        ("range", "azimuth"), found.irw, (RANGE_RESOLUTION, AZIMUTH_RESOLUTION), strict=True
+        ("range", "azimuth"), response.irw, (RANGE_RESOLUTION, AZIMUTH_RESOLUTION), strict=True
     ):
-        out.number(
-            f"{name} resolution of a point: distance of peak and null", TABLE, printed, width / HALF_POWER, 0.02, "m",
-            ".3f", f"{width:.3f} m wide at half power",
-        )  # fmt: skip
-    off = float(np.linalg.norm(found.position))
+        item = f"{name} resolution of a point: distance of peak and null"
+        out.number(item, TABLE, printed, width / HALF_POWER, 0.02, "m", ".3f", f"{width:.3f} m wide at half power")
+    off = float(np.linalg.norm(response.position))
+    item = "place of a point at the origin"
     out.states(
-        "place of a point at the origin", "", "origin", f"{1000 * off:.2f} mm off", off < 0.01, value=off,
-        rule="within 10 mm", basis="geometry",
-    )  # fmt: skip
+        item, "", "origin", f"{1000 * off:.2f} mm off", off < 0.01, value=off, rule="within 10 mm", basis="geometry"
+    )
 
 
 def _curved(range_: float, scene: Scene) -> float:
@@ -91,27 +90,24 @@ def _curved(range_: float, scene: Scene) -> float:
 
 def _table(out: Section, lab: Lab) -> None:
     """Targets, printed and made, and what their echoes take in full size."""
-    made, full = [], []
+    sizes, full = [], []
     for target in _targets.TARGETS:
         scene, needs = lab.scene(target.name), lab.forecast(target.name)
         size = np.diff(scene.bounds, axis=0)[0]
-        made.append([target.name, target.printed, " x ".join(f"{v:.3g}" for v in size), len(scene.triangles)])
-        plan: Any = needs.plan
+        sizes.append([target.name, target.printed, " x ".join(f"{v:.3g}" for v in size), len(scene.triangles)])
+        plan: dict[str, Any] = dict(needs.plan)
         full.append([
             target.name, plan["grid"], plan["steps"], f"{plan['run_bytes'] / 2**30:.1f}", plan["runs"],
             f"{plan['run_seconds'] / 60:.0f}", f"{needs.seconds / 3600:.1f}",
         ])  # fmt: skip
-        out.keep(**{
-            target.name: {"run_bytes": plan["run_bytes"], "runs": plan["runs"], "seconds": needs.seconds}
-        })  # fmt: skip
-    out.draw(html.table(
-        ["target", "table 2", "here: ground range x azimuth x height, m", "facets"], made, "Targets of table 2.",
-        text=True,
-    ))  # fmt: skip
-    out.draw(html.table(
-        ["target", "cells of the grid", "time steps", "GiB per run", "runs", "minutes per run", "hours"], full,
+        out.keep(**{target.name: {"run_bytes": plan["run_bytes"], "runs": plan["runs"], "seconds": needs.seconds}})
+    caption = "Targets of table 2."
+    out.table(["target", "table 2", "here: ground range x azimuth x height, m", "facets"], sizes, caption, text=True)
+    out.table(
+        ["target", "cells of the grid", "time steps", "GiB per run", "runs", "minutes per run", "hours"],
+        full,
         f"What the sizes of the paper take with at least {CELLS[False]} cells per shortest wavelength and "
         f"{FULL_BYTES / 1e9:g} GB for a run, forecast for this machine at its present speed "
         "(sarcl.plan). Figure 8 takes 18 runs more for cuboid and "
         "sharp cone each.",
-    ))  # fmt: skip
+    )

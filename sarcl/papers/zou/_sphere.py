@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
-from ...figures import html
 from ...imaging.backproject import backproject
 from ...reference.mie import conducting_sphere
 from ..paper import Section
@@ -37,18 +36,18 @@ def section(lab: Lab) -> Section:
     mie = np.array([conducting_sphere(a, 2 * np.pi * v / SPEED_OF_LIGHT)[0] for v in f])
     samples = raw.read(0, raw.n_rows)
     apart = float(np.linalg.norm(samples - mie) / (np.linalg.norm(mie) * np.sqrt(raw.n_rows)))
+    item = "sphere: echoes in HH against Mie's series"
+    rule = f"complex error over all pulses and frequencies below {ECHO_ERROR:.0%}"
     out.states(
-        "sphere: echoes in HH against Mie's series", "Mie", "exact", f"differ by {apart:.1%}", apart < ECHO_ERROR,
-        value=apart, rule=f"complex error over all pulses and frequencies below {ECHO_ERROR:.0%}", basis="theory",
-    )  # fmt: skip
+        item, "Mie", "exact", f"differ by {apart:.1%}", apart < ECHO_ERROR, value=apart, rule=rule, basis="theory"
+    )
     optics = np.asarray(lab.optics("sphere").samples)
     closed = optics_of_sphere(a, 2 * np.pi * f / SPEED_OF_LIGHT)
     off = float(np.linalg.norm(optics - closed) / (np.linalg.norm(closed) * np.sqrt(len(optics))))
-    out.states(
-        "sphere: echoes of physical optics against their closed form", "currents of the lit half of a sphere", "exact",
-        f"differ by {off:.1%}", off < OPTICS_ERROR, value=off, basis="theory",
-        rule=f"complex error over all pulses and frequencies below {OPTICS_ERROR:.0%}: the sphere has flat facets",
-    )  # fmt: skip
+    item = "sphere: echoes of physical optics against their closed form"
+    source = "currents of the lit half of a sphere"
+    rule = f"complex error over all pulses and frequencies below {OPTICS_ERROR:.0%}: the sphere has flat facets"
+    out.states(item, source, "exact", f"differ by {off:.1%}", off < OPTICS_ERROR, value=off, basis="theory", rule=rule)
     cross = both.select(polarization="VH").read(0, raw.n_rows)
     level = float(20 * np.log10(np.linalg.norm(cross) / np.linalg.norm(samples)))
     out.states(
@@ -75,15 +74,13 @@ def section(lab: Lab) -> Section:
         f"The sphere has a radius of {a:g} m. Its front is imaged at {peaks[0][1]:.2f} m. The wave that creeps round "
         f"it appears {np.pi / 2 * a:.2f} m behind its centre or a little later."
     )
-    out.draw(html.plot(
-        cuts, "slant range about the centre, m", "dB re 1 m²",
-        "Cut along slant range through the image of the sphere, HH.",
-    ))  # fmt: skip
-    at = f / 1e9
-    out.draw(html.plot(
-        [("full wave, mean over pulses", at, 20 * np.log10(np.sqrt((np.abs(samples) ** 2).mean(axis=0)))),
-         ("Mie's series", at, 20 * np.log10(np.abs(mie)))],
+    caption = "Cut along slant range through the image of the sphere, HH."
+    out.plot(cuts, "slant range about the centre, m", "dB re 1 m²", caption)
+    pulses = f / 1e9
+    out.plot(
+        [("full wave, mean over pulses", pulses, 20 * np.log10(np.sqrt((np.abs(samples) ** 2).mean(axis=0)))),
+         ("Mie's series", pulses, 20 * np.log10(np.abs(mie)))],
         "frequency, GHz", "radar cross section, dB re 1 m²", "Radar cross section of the sphere over the band, HH.",
-    ))  # fmt: skip
+    )  # fmt: skip
     out.keep(error=apart, cross_db=level, ka=[float(2 * np.pi * v * a / SPEED_OF_LIGHT) for v in (f[0], f[-1])])
     return out

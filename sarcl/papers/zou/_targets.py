@@ -23,8 +23,8 @@ class Target:
 
     def scene(self, reduction: float = 1) -> Scene:
         """The target with every length divided by `reduction`; the centre of its box is the origin."""
-        whole = self.make()
-        return Scene.facets((whole.triangles - whole.center) / reduction, two_sided=False)
+        body = self.make()
+        return Scene.facets((body.triangles - body.center) / reduction, two_sided=False)
 
 
 # Solids stand upright. Cuboid and tank are longest along the track: figure 8 of the paper sees a brick broadside.
@@ -35,7 +35,7 @@ TARGETS = (
     Target("d", "blunt cone", "radius 3 m, height 1.5 m", lambda: shapes.cone(3, 1.5, sections=SECTIONS)),
     Target("e", "sphere", "radius 1.5 m", lambda: shapes.sphere(1.5, facets=FACETS)),
     Target("f", "tank", "9.58 x 4.01 x 4.02 m", lambda: shapes.tank(rotation=pi / 2)),
-)  # fmt: skip
+)
 
 
 def find(name: str) -> Target:
