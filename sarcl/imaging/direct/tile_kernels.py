@@ -124,9 +124,7 @@ class GatherKernel:
         launch = launch_numbers("backproject.cl", "backproject", **numbers)
         tables = block.profiles.buffer, self.table, pulses.buffer, constants, centers, offsets
         weights = block.weights or WEIGHT_BUFFERS * (self.table,)
-        self.device.run(
-            self.kernel, size, group, launch, *tables, image, on.missed, *weights, steps=pulses.n_used
-        )
+        self.device.run(self.kernel, size, group, launch, *tables, image, on.missed, *weights, steps=pulses.n_used)
 
 
 class _Lines:
