@@ -11,7 +11,7 @@ from ..base.tolerances import askable, rounded_up
 from ..scattering.antenna_weights import AntennaWeights
 from ..scattering.facets import FacetSet
 from ..scattering.mesh_quality import facet_error, speckle_contrast
-from ..scattering.scatterers import Points, facets_of, points_of
+from ..scattering.scatterers import Points, ShadowRule, facets_of, points_of
 from ..scattering.subdivision import Subdivision
 from ..scene.scene import Scene
 from ._facet_spreading import TiledFacets
@@ -47,12 +47,21 @@ def prepare_scene(plan: ScenePlan, *, tiled: bool = True, exact: bool = True) ->
         speckle = speckle_contrast.judge(cells, seen.antennas, seen.waveform, represents)
         mesh_warnings = warn_of_curves(plan) | _warned(speckle)
         request.report("scene", 1, 3)
+        shadows = ShadowRule(
+            exact=exact,
+            sampled=samples_shadows(request, seen),
+            accuracy=SHADOWS * request.tolerance / parts_of(seen.scene),
+            max_bytes=request.budget / 4,
+            margin=seen.margin,
+        )
         facets, left_out = facets_of(
-            pieces, seen.waveform, seen.antennas, shadows=request.shadows, skips=request.skips,
-            max_bytes=request.budget / 4, device=request.device, progress=request.report,
-            exact=exact and request.shadows, sampled=samples_shadows(request, seen),
-            accuracy=SHADOWS * request.tolerance / parts_of(seen.scene), margin=seen.margin,
-        )  # fmt: skip
+            pieces,
+            seen.antennas,
+            shadows=shadows if request.shadows else None,
+            skips=request.skips,
+            device=request.device,
+            progress=request.report,
+        )
         skipped = {why: skipped.get(why, 0) + n for why, n in left_out.items()}
     _check_left(request, points, facets, skipped)
     if points is not None:

@@ -198,7 +198,7 @@ def lit(
     occluders: np.ndarray | None = None,
     ground: tuple[np.ndarray, np.ndarray] | None = None,
     device: DeviceChoice | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Callable[[int, int], object] | None = None,
 ) -> Illumination:
     """Shares of facets, m (k, 3, 3), that both antennas, m (n_pulses, 3), see, in blocks of pulses.
 
@@ -272,7 +272,7 @@ def lit(
 
 def _within(
     accuracy: float, tolerance: float, solver: IlluminationSolver, triangles: np.ndarray, bounds: np.ndarray,
-    ends: list[np.ndarray], power: np.ndarray, max_bytes: float, progress: Callable[[int, int], None] | None,
+    ends: list[np.ndarray], power: np.ndarray, max_bytes: float, progress: Callable[[int, int], object] | None,
 ) -> tuple[Course, np.ndarray, tuple[float, float, float]]:  # fmt: skip
     """Looks with an error of at most `accuracy`, or as many as there are; their pulses (n,); and errors: of sampling,
     of motion, and the accuracy that could have been asked for.
