@@ -25,7 +25,18 @@ from ..scene.triangles import centroids
 from ._kernel_images import sample_patches
 from ._piece_tiling import PieceTiling
 from ._pulse_levels import PulseLevels
-from .spreading import GROUP, Band, Counts, HostTiling, TiledScatterers, Tiling, is_grouped, most_pulses, splits, terms
+from .spreading import (
+    GROUP,
+    ChannelView,
+    Counts,
+    HostTiling,
+    TiledScatterers,
+    Tiling,
+    is_grouped,
+    most_pulses,
+    splits,
+    terms,
+)
 
 KERNELS = "spread_facets.cl"
 MOST_PULSES = 256  # pulses per block where amplitudes are interpolated: two blocks cannot share their nodes
@@ -77,64 +88,62 @@ class FacetSpreader:
     """
 
     def __init__(
-        self, held: TiledFacets, facets: FacetSet, antennas: PulseGeometry, bandwidth: float, frequencies: np.ndarray,
-        tolerance: float, budget: float, gated: bool, polarizations: Sequence[str], vertical: np.ndarray,
-        weights: AntennaWeights,
-    ) -> None:  # fmt: skip
-        """facets  as the antennas' pulses see them;  gated  leave out facets outside the range window
-        budget  bytes on the device;  frequencies  Hz, of the samples
-        """
-        self.device, self.held, self.facets, self.antennas, self.weights = held.device, held, facets, antennas, weights
-        self.gated, self.n_samples, facet_plan = gated, len(frequencies), held.facet_plan
+        self, tiled: TiledFacets, facets: FacetSet, view: ChannelView, tolerance: float, budget: float
+    ) -> None:
+        """facets  as the channel's pulses see them;  budget  bytes on the device"""
+        self.device, self.tiled, self.facets, self.gated = tiled.device, tiled, facets, view.gated
+        self.antennas, self.weights, self.n_samples = view.antennas, view.weights, len(view.frequencies)
+        antennas, facet_plan = view.antennas, tiled.facet_plan
         # a single antenna receives as V what is sent as H, exactly as it receives as H what is sent as V
         alike = {"VH": "HV"} if antennas.is_monostatic else {}
-        self.wanted = [alike.get(name, name) for name in polarizations]
-        self.made = [name for name in POLARIZATIONS if name in self.wanted]
-        left = tolerance - facet_plan.predicted_error
-        band = Band(self.n_samples, bandwidth, float(antennas.frequency.mean()))
-        room = left - band.least_tolerance(len(facets), left)  # what range profiles need comes first
+        self.columns = [alike.get(name, name) for name in view.polarizations]
+        self.polarizations = [name for name in POLARIZATIONS if name in self.columns]
+        room = tolerance - facet_plan.predicted_error
+        most = min(NODES_SHARE * room, room - view.band.least_tolerance(len(facets), room))  # profiles come first
         self.partly = facets.lit_parts is not None
         # edges of shadows move from pulse to pulse
-        self.pulse_nodes = every(len(antennas)) if self.partly else plan_pulse_nodes(
-            facets, weights, self.made, vertical, float(frequencies[-1]), min(NODES_SHARE * left, room)
-        )  # fmt: skip
-        left -= self.pulse_nodes.error
-        self.plan = held.plan(antennas, band, left, least_tolerance=0.0)
+        if self.partly:
+            self.pulse_nodes = every(len(antennas))
+        else:
+            highest = float(view.frequencies[-1])
+            names = self.polarizations
+            self.pulse_nodes = plan_pulse_nodes(facets, view.weights, names, view.vertical, highest, most)
+        self.plan = tiled.plan(antennas, view.band, room - self.pulse_nodes.error, least_tolerance=0.0)
         self.predicted_error = self.plan.predicted_error + facet_plan.predicted_error + self.pulse_nodes.error
-        self.basis = facet_plan.basis(frequencies).astype(np.float32)
-        self._upload(vertical, tolerance)
+        self.basis = facet_plan.basis(view.frequencies).astype(np.float32)
+        self._upload(view.vertical, tolerance)
         self.at_once, self.tiles_at_once = self._blocks(budget)
         self.levels_at_once = max(2, int(budget / 8 / self.tiles.n_offsets))
 
     def _upload(self, vertical: np.ndarray, tolerance: float) -> None:
         """Kernels, and what all blocks of pulses share on the device."""
-        device, held, plan, weights = self.device, self.held, self.plan, self.weights
-        self.tiles = held.tiles(plan.per_tile)
-        tiles, nodes, bistatic = self.tiles, held.facet_plan.nodes, not self.antennas.is_monostatic
+        device, scatterers, plan, weights = self.device, self.tiled, self.plan, self.weights
+        self.tiles = scatterers.tiles(plan.per_tile)
+        tiles, nodes, bistatic = self.tiles, scatterers.facet_plan.nodes, not self.antennas.is_monostatic
         self.grouped = is_grouped(device)
         macros = {**plan.macros(bistatic), **weights.macros(len(nodes)), "TILE": tiles.per_tile}
         macros |= {
-            "METAL": int(held.metal),
-            "DISPERSIVE": int(held.dispersive),
+            "METAL": int(scatterers.metal),
+            "DISPERSIVE": int(scatterers.dispersive),
             "ROUGH": int(self.facets.is_rough),
             "PULSE_NODES": self.pulse_nodes.order,
             "GROUPED": int(self.grouped),
             "PARTLY": int(self.partly),
             "SHADED": int(self.facets.illumination is not None),
-            **{name: int(name in self.made) for name in POLARIZATIONS},
+            **{name: int(name in self.polarizations) for name in POLARIZATIONS},
             **(diagram_macros() if self.facets.is_rough else {}),
         }
         self.constants = TileConstants(device, plan, bistatic=bistatic)
         self.amplitudes, self.spread = (
             device.kernel(KERNELS, name, **macros) for name in ("facet_amplitudes", "spread_facets")
         )
-        at_nodes = nodes / SPEED_OF_LIGHT, held.facet_plan.scales(), nodes / weights.frequency
+        at_nodes = nodes / SPEED_OF_LIGHT, scatterers.facet_plan.scales(), nodes / weights.frequency
         self.nodes = device.upload(np.stack(at_nodes).astype(np.float32))
         self.patterns, self.second = weights.upload(device)
         self.reach, self.up = device.upload(weights.limits), device.upload(vertical_axes(vertical))
         self.table = device.upload(plan.interpolator.table)
         self.flush = max(1, int(terms(tolerance) / tiles.per_tile))
-        self.channels = len(nodes) * len(self.made)
+        self.channels = len(nodes) * len(self.polarizations)
         self.stride = plan.length + 2 * range_profiles.padding(plan.interpolator)
         self.splits = splits(device, len(self.antennas), tiles.n_tiles, self.grouped)
         self.spectra_of = SpreadSamples(device, self.n_samples, plan.interpolator, plan.length)
@@ -150,7 +159,7 @@ class FacetSpreader:
         room = budget / 2
         pulses = max(1, min(most, int(room / 2 / per_pulse)) // lanes) * lanes
         n_nodes = pulses if spacing == 1 else pulses // spacing + self.pulse_nodes.order + 1
-        parts = 4 * (1 + 2 * len(self.held.facet_plan.nodes)) if self.partly else 0
+        parts = 4 * (1 + 2 * len(self.tiled.facet_plan.nodes)) if self.partly else 0
         per_tile = tiles.per_tile * (8 * self.channels + 1) * n_nodes
         if parts:
             pulses = (
@@ -173,10 +182,10 @@ class FacetSpreader:
             rows, found = self._profiles(levels)
             clock.lap("echo")
             spectra = self.spectra_of.of(rows, self.splits, (stop - start) * self.channels)
-            spectra = spectra.reshape(stop - start, len(self.made), len(self.basis), self.n_samples)
-            for i, name in enumerate(self.wanted):
+            spectra = spectra.reshape(stop - start, len(self.polarizations), len(self.basis), self.n_samples)
+            for i, name in enumerate(self.columns):
                 for m, weight in enumerate(self.basis):
-                    samples[start - first : stop - first, i] += spectra[:, self.made.index(name), m] * weight
+                    samples[start - first : stop - first, i] += spectra[:, self.polarizations.index(name), m] * weight
             pairs, (inside, front, unlit) = (stop - start) * len(self.facets), found.tolist()
             counts += Counts(pairs, pairs - inside - unlit, inside - front, unlit)
             clock.lap("spectra")
@@ -248,7 +257,7 @@ class FacetSpreader:
 
     def _parts(self, start: int, stop: int) -> np.ndarray:
         """Lit parts of the facets at pulses start ... stop - 1, as the kernel reads them: float32 (n, 1 + 2 m, .)."""
-        waves = 2 * np.pi * self.held.facet_plan.nodes / SPEED_OF_LIGHT
+        waves = 2 * np.pi * self.tiled.facet_plan.nodes / SPEED_OF_LIGHT
         light = self.facets.light(start, [end[start:stop] for end in self.antennas.ends], waves)
         order = self.tiles.order
         out = np.empty((stop - start, 1 + 2 * len(waves), len(order)), np.float32)
@@ -261,7 +270,7 @@ class FacetSpreader:
     def _constants(self, rows: np.ndarray, gated: bool) -> tuple[Any, Any, int]:
         """Packed antennas of pulses, the numbers that each shares with the tiles, and the pulses with blanks."""
         device, lanes, tiles = self.device, self.device.info.vector_width, self.tiles
-        packed = self.antennas.picked(rows).packed(self.held.center, self.plan.length, 0, len(rows), lanes)
+        packed = self.antennas.picked(rows).packed(self.tiled.center, self.plan.length, 0, len(rows), lanes)
         n = packed.shape[2]
         pulse, whole = device.upload(packed), (0, tiles.n_tiles)
         constants = self.constants.compute(pulse, n, tiles.references, tiles.radius, whole, tiles.n_tiles, int(gated))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from ..scattering.facets import FacetSet, Light
 from ..scattering.scatterers import Points
 from ._exact_facets import facet_samples, inside_window
 from .scene_echoes import SceneEchoes
+from .spreading import ChannelView
 
 CANDIDATES = 256  # pulses among which those that are checked are drawn
 MOST_DRAWS = 16  # pulses, and frequencies at each of them
@@ -63,10 +63,10 @@ def measure_error(
     pulses, represented = _drawn(samples, draws, random)
     for p, share in zip(pulses.tolist(), represented.tolist(), strict=True):
         n = random.integers(0, len(frequencies), draws)
-        wanted, power = exact(scene, antennas, p, frequencies[n], scene.weights)
-        wanted *= spectrum[n]
-        wrong += share * float((np.abs(samples[p][:, n] - wanted) ** 2).sum())
-        right += share * float((np.abs(wanted) ** 2).sum())
+        echo, power = exact(scene, antennas, p, frequencies[n], scene.weights)
+        echo *= spectrum[n]
+        wrong += share * float((np.abs(samples[p][:, n] - echo) ** 2).sum())
+        right += share * float((np.abs(echo) ** 2).sum())
         random_phases += share * float((power * np.abs(spectrum[n]) ** 2).sum())
     return float(np.sqrt(wrong / max(right, random_phases))) if wrong else 0.0
 
@@ -90,38 +90,21 @@ def exact(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Exact sums over a scene's scatterers (n_polarizations, n), and their power at random phases."""
     request = scene.request
+    view = ChannelView(antennas, weights, frequencies, 0.0, request.polarizations, request.vertical, gated=True)
     values = np.zeros((len(request.polarizations), len(frequencies)), np.complex128)
     powers = np.zeros(values.shape)
     for part in (scene.points, scene.facets):
         if part is not None:
-            value, power = _exact(part, antennas, pulse, frequencies, request.polarizations, request.vertical, weights)
+            value, power = _exact(part, view, pulse)
             values, powers = values + value, powers + power
     return values, powers
 
 
-def _exact(
-    part: Points | FacetSet,
-    antennas: PulseGeometry,
-    p: int,
-    frequencies: np.ndarray,
-    polarizations: Sequence[str],
-    vertical: np.ndarray,
-    beam: AntennaWeights,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Samples (n_polarizations, n) of pulse p at frequencies, Hz, and their power at random phases."""
+def _exact(part: Points | FacetSet, view: ChannelView, p: int) -> tuple[np.ndarray, np.ndarray]:
+    """Samples (n_polarizations, n) of pulse p at the frequencies, and their power at random phases."""
+    antennas, frequencies, polarizations = view.antennas, view.frequencies, view.polarizations
     if isinstance(part, FacetSet):
-        inside = inside_window(part, antennas, p)
-        return facet_samples(
-            part,
-            antennas,
-            p,
-            frequencies,
-            polarizations,
-            vertical,
-            beam,
-            inside,
-            _light(part, antennas, p, frequencies),
-        )
+        return facet_samples(part, view, p, inside_window(part, antennas, p), _light(part, antennas, p, frequencies))
     from ..reference.echo import echo as exact_echo
 
     tx, rx, places = antennas.tx[p], antennas.rx[p], part.positions
@@ -133,7 +116,7 @@ def _exact(
     place = (tx, rx, float(antennas.reference_range[p]))
     same = [i for i, name in enumerate(polarizations) if name[0] == name[1]]
     for j, f in enumerate(frequencies.tolist()):
-        a = part.amplitudes * inside * beam.weights(places, p, f)
+        a = part.amplitudes * inside * view.weights.weights(places, p, f)
         values[same, j] = exact_echo(places, a, frequencies[j : j + 1], *place)[0]
         powers[same, j] = (np.abs(a) ** 2).sum()
     return values, powers

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
@@ -18,6 +18,7 @@ from ..numerics.plan import LEAST_TOLERANCE, Plan, carrier_steps, cheapest, leas
 from ..numerics.pulse_geometry import PulseGeometry
 from ..numerics.tiles import Tiles, tile_points
 from ..opencl.device import Device
+from ..scattering.antenna_weights import AntennaWeights
 from ._kernel_images import PatchSamples
 
 PER_TILE = (256, 64)
@@ -66,6 +67,30 @@ class Band:
         """
         steps = carrier_steps(self.carrier, self.n_samples, self.bandwidth)
         return least(self.n_samples, _chunk(n_scatterers, tolerance), steps)
+
+
+@dataclass(frozen=True, eq=False)
+class ChannelView:
+    """A channel at one receiver, as it sees scatterers.
+
+    antennas  of its pulses, and  weights  as these see the scatterers
+    frequencies  Hz, of its samples, over a band of `bandwidth`, Hz
+    polarizations  of them, with V nearest to `vertical` (3,)
+    gated     leave out scatterers outside the range window
+    """
+
+    antennas: PulseGeometry
+    weights: AntennaWeights
+    frequencies: np.ndarray
+    bandwidth: float
+    polarizations: Sequence[str]
+    vertical: np.ndarray
+    gated: bool
+
+    @property
+    def band(self) -> Band:
+        """The band of a row of its samples."""
+        return Band(len(self.frequencies), self.bandwidth, float(self.antennas.frequency.mean()))
 
 
 @dataclass(frozen=True, eq=False)
