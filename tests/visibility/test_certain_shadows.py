@@ -35,7 +35,7 @@ def states(device, facets, occluders, antennas):
     chosen, n = with_float64(device), np.arange(len(facets))
     packed = Receivers(n, facets, np.ones(len(n), bool)).packed(n, np.zeros(3), ON_PLANE)
     index, solid = chosen.upload(n.astype(np.int32)), chosen.upload(occluders.reshape(-1, 9))
-    return certain_shadows(chosen, chosen.upload(packed), index, index, solid, len(n), antennas)
+    return certain_shadows(chosen, (chosen.upload(packed), index, index, solid), len(n), antennas)
 
 
 @pytest.mark.parametrize("seed", range(12))
