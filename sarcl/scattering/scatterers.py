@@ -17,7 +17,7 @@ from ..scene import triangles as geometry
 from ..scene.scene import Scene
 from ..scene.terrain import above, check_above, clear_of, facets_on
 from ..visibility.illumination import ALL_DARK, Illumination, lit
-from ..visibility.lit_parts import ON_PLANE, LitParts
+from ..visibility.lit_parts import ON_PLANE, FacetPieces, LitParts
 from ._random_surface import Pieces
 from .facet_kinds import coherent
 from .facets import FacetSet
@@ -147,20 +147,10 @@ def _lit_parts_of(
     pieces: Pieces, wanted: np.ndarray, antennas: PulseGeometry, rule: ShadowRule, device: Device, progress: Progress
 ) -> LitParts:
     """Lit parts of the pieces `wanted` (k,), which the facets that they are parts of occlude."""
-    given = pieces.original.triangles
-    return LitParts(
-        device,
-        pieces.scene.triangles,
-        given,
-        antennas.ends,
-        two_sided=pieces.scene.two_sided,
-        wanted=wanted,
-        max_bytes=rule.max_bytes,
-        margin=rule.margin,
-        given=given,
-        of=pieces.of,
-        progress=progress,
-    )
+    scene, given = pieces.scene, pieces.original.triangles
+    facets = FacetPieces(scene.triangles, scene.two_sided, wanted, given, pieces.of)
+    options = {"max_bytes": rule.max_bytes, "margin": rule.margin}
+    return LitParts(device, facets, given, antennas.ends, progress=progress, **options)
 
 
 def _rough_facets_of(

@@ -14,7 +14,6 @@ from ..numerics import range_profiles
 from ..numerics.device_profiles import SpreadSamples
 from ..numerics.pulse_geometry import PulseGeometry
 from ..numerics.tile_constants import TileConstants
-from ..opencl.device import Device
 from ..opencl.launch_numbers import launch_numbers
 from ..scattering.antenna_weights import AntennaWeights
 from ..scattering.facet_plan import FacetPlan
@@ -22,9 +21,10 @@ from ..scattering.facets import POLARIZATIONS, FacetSet, diagram_macros, vertica
 from ..scattering.pulse_nodes import every, plan_pulse_nodes
 from ..scattering.rough_pieces import RoughFacets
 from ..scene.triangles import centroids
-from ._kernel_images import sample_patches
+from ._kernel_images import PatchSamples, sample_patches
 from ._piece_tiling import PieceTiling
 from ._pulse_levels import PulseLevels
+from .echo_request import EchoRequest
 from .spreading import (
     GROUP,
     ChannelView,
@@ -51,10 +51,11 @@ class TiledFacets(TiledScatterers):
     """
 
     def __init__(
-        self, device: Device, facets: FacetSet, plan: FacetPlan, antennas: PulseGeometry, waveform: Waveform,
-        weights: AntennaWeights, polarizations: Sequence[str], vertical: np.ndarray,
+        self, request: EchoRequest, facets: FacetSet, plan: FacetPlan, antennas: PulseGeometry, waveform: Waveform,
+        weights: AntennaWeights,
     ) -> None:  # fmt: skip
-        """antennas, waveform, weights, polarizations  of all channels: samples of patches are computed for them"""
+        """antennas, waveform, weights  of all channels: samples of patches are computed for them"""
+        device = request.device
         self.facets, self.facet_plan, nodes = facets, plan, plan.nodes
         self.metal = all(np.isinf(m.conductivity) for m in facets.materials)
         roots = np.stack([facets.roots(float(f)) for f in nodes])
@@ -62,7 +63,7 @@ class TiledFacets(TiledScatterers):
 
         def amplitudes(some: np.ndarray, pulse: int, frequency: float) -> np.ndarray:
             ends, f = (antennas.tx[pulse], antennas.rx[pulse]), np.array([frequency])
-            sent = facets.picked(some).amplitudes(*ends, f, polarizations, vertical)[0]
+            sent = facets.picked(some).amplitudes(*ends, f, request.polarizations, request.vertical)[0]
             return np.asarray(sent * weights.weights(positions[some], pulse, frequency)[:, None])
 
         tiling: Tiling
@@ -74,10 +75,12 @@ class TiledFacets(TiledScatterers):
             tiling = HostTiling(
                 device, positions, lambda order: facets.planes(order, nodes, self.metal, self.dispersive)
             )
-        super().__init__(
-            device, tiling, len(antennas) * len(nodes) * len(polarizations) if facets.is_mirror else 0,
-            lambda order: sample_patches(positions, order, antennas, waveform, amplitudes),
-        )  # fmt: skip
+        n_sums = len(antennas) * len(nodes) * len(request.polarizations)
+
+        def patches(order: np.ndarray) -> PatchSamples:
+            return sample_patches(positions, order, antennas, waveform, amplitudes)
+
+        super().__init__(device, tiling, n_sums if facets.is_mirror else 0, patches)
 
 
 class FacetSpreader:

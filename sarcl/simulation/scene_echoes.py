@@ -87,11 +87,8 @@ class SceneEchoes:
         steady, changing = self.facets.steady()
         if changing is None:
             return steady, None
-        request, plan = self.request, self.subdivision.plan
         tiled = tuple(
-            TiledFacets(
-                request.device, part, plan, antennas, waveform, self.weights, request.polarizations, request.vertical
-            )
+            TiledFacets(self.request, part, self.subdivision.plan, antennas, waveform, self.weights)
             for part in changing.split()
         )
         alone = replace(self, points=None, facets=changing, tiled_points=None, tiled_facets=tiled, shadow_terms=())

@@ -112,11 +112,9 @@ def _tiled_facets(
     """Facets in tiles on the device, partly lit ones apart from the others; none where their sums are in float64."""
     if facets is None or subdivision is None or subdivision.plan.is_float64:
         return ()
-    request, seen, rule = plan.request, plan.seen, subdivision.plan
+    seen = plan.seen
     return tuple(
-        TiledFacets(
-            request.device, part, rule, seen.antennas, seen.waveform, weights, request.polarizations, request.vertical
-        )
+        TiledFacets(plan.request, part, subdivision.plan, seen.antennas, seen.waveform, weights)
         for part in facets.split()
     )
 

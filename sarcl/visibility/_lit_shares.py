@@ -19,7 +19,7 @@ from ..scene.scene import Scene
 from ..scene.triangles import centroids, normals
 from ._frame import DevicePoints, Frame
 from ._ray_casting import Occluders
-from .lit_parts import LitParts
+from .lit_parts import FacetPieces, LitParts
 
 AT_ONCE = 64  # pulses whose lit parts are computed together
 FIRST_LOOKS = 9  # pulses from which pixels are looked at first
@@ -50,10 +50,8 @@ def facet_shares(
     opened = open_device(device)
     triangles, out = scene.triangles, np.ones((n, k), np.float32)
     places, normal, one_sided = centroids(triangles), normals(triangles), ~scene.two_sided
-    parts = LitParts(
-        opened, triangles, triangles, ends, two_sided=scene.two_sided, wanted=np.ones(k, bool),
-        max_bytes=budget(opened, None) / 4,
-    )  # fmt: skip
+    pieces = FacetPieces.uncut(triangles, scene.two_sided)
+    parts = LitParts(opened, pieces, triangles, ends, max_bytes=budget(opened, None) / 4)
     for first in range(0, n, AT_ONCE):
         some = slice(first, min(first + AT_ONCE, n))
         antennas = [end[some] for end in ends]
