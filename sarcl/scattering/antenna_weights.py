@@ -188,7 +188,7 @@ class AntennaWeights:
             "SPREADING": int(self.radar is not None),
         }
 
-    def upload(self, device: Device) -> tuple[Any, int]:
+    def upload(self, device: Device) -> tuple[object, int]:
         """Patterns on a device, one after the other, and the index at which the second begins."""
         packed = [one.packed(self.frequency) for one in self.patterns] or [np.zeros(1, np.float32)]
         return device.upload(np.concatenate(packed)), len(packed[0])
@@ -202,7 +202,12 @@ class AntennaWeights:
 
 
 def weights_of(
-    antenna: Any, radar: Any, track: Trajectory, receiver: Trajectory | None, waveform: Waveform, center: np.ndarray
+    antenna: object,
+    radar: Radar | None,
+    track: Trajectory,
+    receiver: Trajectory | None,
+    waveform: Waveform,
+    center: np.ndarray,
 ) -> AntennaWeights:
     """The weights for the arguments `antenna` and `radar` of `sarcl.echo`; center  of the scene, m (3,).
 

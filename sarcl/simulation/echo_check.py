@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Protocol
 
 import numpy as np
 
@@ -22,6 +22,14 @@ FEWEST_DRAWS, MANY_FACETS = (4, 2), 2_000_000  # up to so many facets, and above
 FACET_SAMPLES = 256 * 20_000  # facets times samples: two or three seconds
 PER_FACET, PER_POINT = 5e-7, 6e-8  # s, to recompute the share of a facet or point in a sample, on one core
 PER_LIT_PART = 5e-3  # s, to recompute the lit part of a facet, past some ten occluders, on one core
+
+
+class PulseRows(Protocol):
+    """Samples in memory or in a file: of each pulse (n_polarizations, n_samples)."""
+
+    def __len__(self) -> int: ...
+
+    def __getitem__(self, pulse: int, /) -> np.ndarray: ...
 
 
 def draws_of(scene: SceneEchoes) -> int:
@@ -47,7 +55,7 @@ def worth_checking(scene: SceneEchoes, check: bool | None, channels: float = 1) 
 
 
 def measure_error(
-    scene: SceneEchoes, antennas: PulseGeometry, frequencies: np.ndarray, spectrum: np.ndarray, samples: Any
+    scene: SceneEchoes, antennas: PulseGeometry, frequencies: np.ndarray, spectrum: np.ndarray, samples: PulseRows
 ) -> float:
     """Relative error of 256 random samples (16 random pulses, 16 frequencies each) against the exact sum; of as many as
     take two or three seconds where there are more than 20 000 facets, and at least 16, or 4 above 2 million.
@@ -71,7 +79,7 @@ def measure_error(
     return float(np.sqrt(wrong / max(right, random_phases))) if wrong else 0.0
 
 
-def _drawn(samples: Any, draws: int, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+def _drawn(samples: PulseRows, draws: int, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """Random pulses (draws,), and the number of pulses that each represents, up to a factor."""
     some = spread_over(len(samples), CANDIDATES)
     energy = np.array([np.linalg.norm(samples[p].astype(np.complex128, copy=False)) ** 2 for p in some.tolist()])

@@ -102,7 +102,7 @@ def row_fields(
     """Fields of a PhaseHistory that has a row per pulse and polarisation, pulse by pulse."""
     n, back = len(polarizations), track if receiver is None else receiver
 
-    def every(values: Any) -> Any:
+    def every(values: np.ndarray | None) -> np.ndarray | None:
         return values if n == 1 or values is None else np.repeat(values, n, axis=0)
 
     return {
@@ -117,7 +117,7 @@ def row_fields(
 
 
 def window(
-    scene: Scene, waveform: Waveform, tx: np.ndarray, rx: np.ndarray, reference_range: np.ndarray, asked: Any
+    scene: Scene, waveform: Waveform, tx: np.ndarray, rx: np.ndarray, reference_range: np.ndarray, asked: object
 ) -> tuple[float, float]:
     """The range gate (near, far) about the reference, m: as asked, or that which holds the scene's box plus 10 %."""
     if asked is not None:

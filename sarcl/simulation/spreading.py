@@ -107,10 +107,10 @@ class DeviceTiles:
     per_tile: int
     n_tiles: int
     order: np.ndarray
-    references: Any
-    radius: Any
-    offsets: Any
-    planes: Any
+    references: object
+    radius: object
+    offsets: object
+    planes: object
     n_offsets: int
     last: int
 
