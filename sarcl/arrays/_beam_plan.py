@@ -72,10 +72,12 @@ def make_plan(
     while best <= LARGEST_TOLERANCE and not met(best):
         best = rounded_up(1.05 * best)
     raise ToleranceUnreachable(
-        tolerance, askable(best), "rounding of path differences",
+        tolerance,
+        askable(best),
+        "rounding of path differences",
         how=f"on {device.info.name!r}{'' if fp64 else ' without float64'}, for points "
         f"{highest * farthest / SPEED_OF_LIGHT:.1e} wavelengths away and an array of {cycles:.1e}",
-    )  # fmt: skip
+    )
 
 
 def _rounding(double: bool) -> float:

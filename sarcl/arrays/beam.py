@@ -66,9 +66,10 @@ def beam(
     points = x.reshape(-1, 3)
     kind = np.complex64 if tolerance >= FINE else np.complex128
     validation.room(
-        f"a field of {t.size:,} times at {len(points):,} points", float(t.size) * len(points) * np.dtype(kind).itemsize,
+        f"a field of {t.size:,} times at {len(points):,} points",
+        float(t.size) * len(points) * np.dtype(kind).itemsize,
         "give fewer times or positions at once",
-    )  # fmt: skip
+    )
     out = np.empty((t.size, len(points)), kind)
     if not out.size:
         return out.reshape(t.shape + x.shape[:-1])

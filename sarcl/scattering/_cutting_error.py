@@ -32,7 +32,7 @@ from ._facet_norm import (
     longest_piece,
     path_beyond,
     random_pieces,
-)  # fmt: skip
+)
 from ._facet_sampling import drawn
 from .facet_kinds import FacetView
 from .mesh_quality.facet_groups import coplanar_groups

@@ -62,9 +62,7 @@ def lobe_wavenumbers(center: float, bandwidth: float, triangles: np.ndarray, of:
 class FacetNorm:
     """Norms of coherent facets, estimated from the planes of up to 200 of them. Facets are perfect conductors here."""
 
-    def __init__(
-        self, scene: Scene, mirror: np.ndarray, ends: Sequence[Ends], center: float, bandwidth: float
-    ) -> None:  # fmt: skip
+    def __init__(self, scene: Scene, mirror: np.ndarray, ends: Sequence[Ends], center: float, bandwidth: float) -> None:
         """mirror  True for coherent facets (k,);  ends  antennas at some pulses;  center, bandwidth  Hz"""
         self._ends = ends
         group, self._weight = _sampled_planes(scene, np.flatnonzero(mirror))

@@ -49,21 +49,26 @@ class WeightError:
         """Raise ToleranceUnreachable where rounding leaves too little of the tolerance."""
         if not self.rounding <= ROUNDING * tolerance:
             raise ToleranceUnreachable(
-                tolerance, self.rounding / ROUNDING * (1 + 1e-9), "float32 gains of the antennas", "aim at the scene",
+                tolerance,
+                self.rounding / ROUNDING * (1 + 1e-9),
+                "float32 gains of the antennas",
+                "aim at the scene",
                 how="with these antennas: gains are in float32, and the echoes lie "
                 f"{20 * np.log10(self.peak_to_rms):.0f} dB below the beam's peak",
-            )  # fmt: skip
+            )
 
     def of(self, n: int, tolerance: float) -> float:
         """Error of points with n nodes; ToleranceUnreachable where it leaves too little of the tolerance."""
         error = self.rounding + float(self.over_band[n])
         if not error <= OVER_BAND * tolerance:
             raise ToleranceUnreachable(
-                tolerance, error / OVER_BAND * (1 + 1e-9), "gains over the band",
+                tolerance,
+                error / OVER_BAND * (1 + 1e-9),
+                "gains over the band",
                 "halve the band and add the halves' images",
                 how=f"with these antennas: gains change too much over the band to be interpolated between {n} "
                 "frequencies",
-            )  # fmt: skip
+            )
         return error
 
     def with_phase(self, n: int, of_phase: Sequence[float]) -> float:

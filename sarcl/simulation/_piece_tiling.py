@@ -60,9 +60,13 @@ class PieceTiling:
         n_tiles = -(-len(self) // per_tile)
         tiles = self.device.empty(32 * n_tiles)
         self.device.run(
-            self.device.kernel(KERNELS, "tile_bounds"), in_groups(n_tiles), None, self._tile_numbers(per_tile, n_tiles),
-            self._placed[0], tiles,
-        )  # fmt: skip
+            self.device.kernel(KERNELS, "tile_bounds"),
+            in_groups(n_tiles),
+            None,
+            self._tile_numbers(per_tile, n_tiles),
+            self._placed[0],
+            tiles,
+        )
         return self.device.download(tiles, np.empty((4, n_tiles))), tiles
 
     def _tile_numbers(self, per_tile: int, n_tiles: int) -> np.ndarray:

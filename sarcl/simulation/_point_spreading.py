@@ -32,9 +32,11 @@ def tiled_points(
         return (weights.weights(points.positions[some], pulse, frequency) * points.amplitudes[some])[:, None]
 
     return TiledScatterers(
-        device, HostTiling(device, points.positions, points.planes), len(antennas),
+        device,
+        HostTiling(device, points.positions, points.planes),
+        len(antennas),
         lambda order: sample_patches(points.positions, order, antennas, waveform, amplitudes),
-    )  # fmt: skip
+    )
 
 
 @dataclass(frozen=True, eq=False)

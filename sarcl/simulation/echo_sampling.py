@@ -68,11 +68,15 @@ def in_flight(
     box = corners(scene.bounds)
     _, _, down_there, up_there = antennas_in_flight(p[some, None], v[some, None], a[some, None], box)
     off = SPEED_OF_LIGHT * (down_there + up_there) / 2 - half_path(tx[some, None], rx[some, None], box)
-    return sends, hears, {
-        "receiver": "at the echo's arrival",
-        "stop_and_go_error_m": _rounded(SPEED_OF_LIGHT * (down + up) / 2 - still),
-        "arrival_error_m": _rounded(off),
-    }  # fmt: skip
+    return (
+        sends,
+        hears,
+        {
+            "receiver": "at the echo's arrival",
+            "stop_and_go_error_m": _rounded(SPEED_OF_LIGHT * (down + up) / 2 - still),
+            "arrival_error_m": _rounded(off),
+        },
+    )
 
 
 def _check_seen(antennas: np.ndarray, point: np.ndarray) -> None:

@@ -116,9 +116,13 @@ def samples_shadows(request: EchoRequest, seen: SeenScene) -> bool:
 
 
 def plan_scene(
-    request: EchoRequest, seen: SeenScene, weight_error: WeightError, bands: Iterable[Band], tolerance: float,
+    request: EchoRequest,
+    seen: SeenScene,
+    weight_error: WeightError,
+    bands: Iterable[Band],
+    tolerance: float,
     max_edge: float | str | None,
-) -> Subdivision | None:  # fmt: skip
+) -> Subdivision | None:
     """How a scene's facets are cut for `tolerance`, None where there are none.
 
     ToleranceUnreachable where gains, facets, or samples of one of `bands` exceed their shares of it.

@@ -127,9 +127,10 @@ def _shadow_terms(request: EchoRequest, scene: Scene, facets: FacetSet | None) -
     share, light = SHADOWS / parts_of(scene), facets.illumination
     if light.error > share * request.tolerance:
         raise ToleranceUnreachable(
-            request.tolerance, askable(rounded_up(1.05 * light.reached / share)),
+            request.tolerance,
+            askable(rounded_up(1.05 * light.reached / share)),
             "shadow edges on rough facets, counted in samples at single pulses",
-        )  # fmt: skip
+        )
     remedy = "a smaller tolerance: it asks for "
     return (
         ErrorTerm("shadow edges", light.sampling, remedy + "more samples of each facet"),

@@ -42,9 +42,11 @@ class Counts:
 
     def __add__(self, other: Counts) -> Counts:
         return Counts(
-            self.pairs + other.pairs, self.outside_window + other.outside_window,
-            self.facing_away + other.facing_away, self.outside_beam + other.outside_beam,
-        )  # fmt: skip
+            self.pairs + other.pairs,
+            self.outside_window + other.outside_window,
+            self.facing_away + other.facing_away,
+            self.outside_beam + other.outside_beam,
+        )
 
     @property
     def contributing(self) -> int:
@@ -137,9 +139,7 @@ class HostTiling:
     """Scatterers put into tiles on the host, in Morton order. Tiles of one size stay on the device: those of the last
     plan."""
 
-    def __init__(
-        self, device: Device, positions: np.ndarray, planes: Callable[[np.ndarray], np.ndarray]
-    ) -> None:  # fmt: skip
+    def __init__(self, device: Device, positions: np.ndarray, planes: Callable[[np.ndarray], np.ndarray]) -> None:
         """positions  m (n, 3);  planes  of an order: the scatterers' numbers as the kernel reads them"""
         self.device, self.positions, self._planes = device, positions, planes
         self.bounds, self.order = box(positions), morton_order(positions)

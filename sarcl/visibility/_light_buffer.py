@@ -41,7 +41,7 @@ class LightBuffer:
         least, size = seen.min(axis=0), np.maximum(np.ptp(seen, axis=0), 1e-6)
         self._fixed: dict[str, Any] = dict(
             eye=frame.eye(viewpoint)[:3], across=axes[0], upward=axes[1], toward=toward, distance=distance, least=least
-        )  # fmt: skip
+        )
         self._planes = device.empty(64 * n)
         side = np.sqrt(size.prod() / (n * float(np.clip(CELLS / n, 1.0, WIDEST))))
         while True:

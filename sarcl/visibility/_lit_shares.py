@@ -28,9 +28,13 @@ LEFT = 1e-3  # of the pixels, which may change by more than the tolerance
 
 
 def facet_shares(
-    scene: Scene, track: Trajectory, *, receiver: Trajectory | None = None, device: DeviceChoice | None = None,
+    scene: Scene,
+    track: Trajectory,
+    *,
+    receiver: Trajectory | None = None,
+    device: DeviceChoice | None = None,
     progress: Callable[[int, int], None] | None = None,
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """Share of the area of each facet that both antennas see at each pulse, 0 to 1: float32 (n_pulses, k).
 
     Exact, as `echo` takes it: facets are clipped along the shadows' edges, and one-sided ones that face away are dark.

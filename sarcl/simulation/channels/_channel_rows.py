@@ -100,10 +100,14 @@ class ChannelRows:
             frequency[:] = (center + offsets - (sampling.width - 1) / 2 * sampling.step)[:, :, None]
         pulse, tx_channel, rx_channel = (i.ravel() for i in np.indices(self.shape))
         out: dict[str, Any] = {
-            "frequency": frequency.reshape(n), "tx": tx.reshape(n, 3), "rx": rx.reshape(n, 3),
-            "reference_range": reference.reshape(n), "time": None if track.times is None else track.times[pulse],
-            "tx_channel": tx_channel if self.separated else None, "rx_channel": tx_channel if own else rx_channel,
-        }  # fmt: skip
+            "frequency": frequency.reshape(n),
+            "tx": tx.reshape(n, 3),
+            "rx": rx.reshape(n, 3),
+            "reference_range": reference.reshape(n),
+            "time": None if track.times is None else track.times[pulse],
+            "tx_channel": tx_channel if self.separated else None,
+            "rx_channel": tx_channel if own else rx_channel,
+        }
         for name, velocities in (("tx_velocity", track.velocities), ("rx_velocity", back.velocities)):
             out[name] = None if velocities is None else velocities[pulse]
         every = {k: v if v is None or len(names) == 1 else np.repeat(v, len(names), axis=0) for k, v in out.items()}

@@ -67,9 +67,13 @@ class AmplitudeSamples:
     """Random scatterers, and pairs of scatterer and pulse at which expansions are compared with the amplitudes."""
 
     def __init__(
-        self, amplitudes: Amplitudes, size: np.ndarray, band: tuple[float, float],
-        seen: Callable[[np.ndarray, np.random.Generator], np.ndarray], kinds: np.ndarray | None = None,
-    ) -> None:  # fmt: skip
+        self,
+        amplitudes: Amplitudes,
+        size: np.ndarray,
+        band: tuple[float, float],
+        seen: Callable[[np.ndarray, np.random.Generator], np.ndarray],
+        kinds: np.ndarray | None = None,
+    ) -> None:
         """size  (n,) of the scatterers, such as areas: large ones are drawn more often;  band  Hz, its limits
         seen    (scatterers (n,), random) -> sines (n,) at which random pulses of the track see them
         kinds   int (n,), of scatterers whose errors are judged apart: the pieces of a specular facet add up in phase,
@@ -137,9 +141,12 @@ def expand(samples: AmplitudeSamples, sines: tuple[float, float], tolerance: flo
         if rank == len(order):
             break
     raise ToleranceUnreachable(
-        asked, None, "amplitudes that change along the track", "use echo, which computes them pulse by pulse",
+        asked,
+        None,
+        "amplitudes that change along the track",
+        "use echo, which computes them pulse by pulse",
         how=f"by spectral_echo: {len(order)} functions of aspect leave {best:.1e} of these scatterers' amplitudes",
-    )  # fmt: skip
+    )
 
 
 def one_function(samples: AmplitudeSamples, sine: float) -> AspectExpansion:

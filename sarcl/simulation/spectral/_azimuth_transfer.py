@@ -204,9 +204,12 @@ def plan_transfer(
         if error <= tolerance:
             return replace(made, error=error)
     raise ToleranceUnreachable(
-        asked, None, "transform along the track of beams with edges", "use echo",
+        asked,
+        None,
+        "transform along the track of beams with edges",
+        "use echo",
         f"by spectral_echo: transfer functions leave {best:.1e} of the responses along the track",
-    )  # fmt: skip
+    )
 
 
 def response_error(

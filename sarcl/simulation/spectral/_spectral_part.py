@@ -257,9 +257,12 @@ def _transfer(
 
 
 def _brightest(
-    amplitudes: ScattererAmplitudes, track: StraightTrack, drawn: np.ndarray, factors: np.ndarray,
+    amplitudes: ScattererAmplitudes,
+    track: StraightTrack,
+    drawn: np.ndarray,
+    factors: np.ndarray,
     band: tuple[float, float],
-) -> SeenScatterers:  # fmt: skip
+) -> SeenScatterers:
     """Those of some scatterers (n,), with factors (n, J), that the middle or an end of the track sees brightest."""
     power = np.zeros(len(drawn))
     for place in (0.0, track.length / 2, track.length):
@@ -275,7 +278,10 @@ def _check_saras(of_amplitudes: float, of_transfer: float, outside: float, allow
     if not error <= allowed:
         best = rounded_up(1.05 * asked * error / allowed)
         raise ToleranceUnreachable(
-            asked, askable(best), "SARAS's transfer function", "take variant='exact', or echo",
+            asked,
+            askable(best),
+            "SARAS's transfer function",
+            "take variant='exact', or echo",
             "by variant='saras': stationary phase, parabolas and the grid deformation differ from the responses along "
             f"the track by {of_transfer:.1e}, amplitudes of one aspect by {of_amplitudes:.1e}",
-        )  # fmt: skip
+        )
