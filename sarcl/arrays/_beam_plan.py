@@ -64,9 +64,9 @@ def make_plan(
                 return FieldPlan(double, error, allowed / (4 * np.pi * SHIFT_STEPS[fp64]))
         return None
 
-    found = met(tolerance)
-    if found is not None:
-        return found
+    plan = met(tolerance)
+    if plan is not None:
+        return plan
     least = fixed + _rounding(fp64)
     best = rounded_up(least if fp64 else max(FINE, least + U32))
     while best <= LARGEST_TOLERANCE and not met(best):

@@ -159,11 +159,11 @@ class _Field:
         for lane_block in outer:
             lane = outer_table(lane_block)
             for row_block in inner:
-                made = self._sum(lane, kept or inner_table(row_block), len(row_block))[:, : len(lane_block)]
+                sums = self._sum(lane, kept or inner_table(row_block), len(row_block))[:, : len(lane_block)]
                 if along_times:
-                    out[np.ix_(lane_block, row_block)] = made.T
+                    out[np.ix_(lane_block, row_block)] = sums.T
                 else:
-                    out[np.ix_(row_block, lane_block)] = made
+                    out[np.ix_(row_block, lane_block)] = sums
 
     def _table(self, name: str, entries: np.ndarray, elements: np.ndarray, *, lanes_are: bool) -> tuple[Any, int]:
         """The table of kernel `name`, and its number of entries: whole tiles, the last one filled up with repeats."""

@@ -196,11 +196,11 @@ class _Seen:
     def echoes(self, k: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """S I of the pieces with linear phase, about their centroids, complex128 (n, n polarisations), and the same as
         sums over their parts; k  rad/m (n,)."""
-        made = [
+        echoes_of_parts = [
             matrix * (triangle_integral(triangles, k[:, None] * q) * np.exp(-1j * k * path))[:, None]
             for triangles, matrix, q, path in self.parts
         ]
-        return made[0], np.asarray(sum(made[1:]))
+        return echoes_of_parts[0], np.asarray(sum(echoes_of_parts[1:]))
 
 
 def _halves(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -146,9 +146,9 @@ class FacetNorm:
             q = unit(ends[0] - places) + unit(ends[1] - places)
             path = path_beyond(ends, middle[of], places - middle[of])
             for k in self._wavenumbers[self._group[of]].T:
-                made = group_sums(of, triangle_integral(parts, k[:, None] * q) * np.exp(-1j * k * path), len(triangles))
-                facets += np.abs(made) ** 2
-                planes += np.abs(group_sums(self._group, made, n_planes)) ** 2
+                sums = group_sums(of, triangle_integral(parts, k[:, None] * q) * np.exp(-1j * k * path), len(triangles))
+                facets += np.abs(sums) ** 2
+                planes += np.abs(group_sums(self._group, sums, n_planes)) ** 2
         return facets, planes
 
 

@@ -182,14 +182,14 @@ class FacetSpreader:
         counts, first = Counts(), pulses[0]
         for levels in self._pulse_blocks(first, pulses[-1] + 1):
             start, stop = levels.start, levels.stop
-            rows, found = self._profiles(levels)
+            rows, pair_counts = self._profiles(levels)
             clock.lap("echo")
             spectra = self.spectra_of.of(rows, self.splits, (stop - start) * self.channels)
             spectra = spectra.reshape(stop - start, len(self.polarizations), len(self.basis), self.n_samples)
             for i, name in enumerate(self.columns):
                 for m, weight in enumerate(self.basis):
                     samples[start - first : stop - first, i] += spectra[:, self.polarizations.index(name), m] * weight
-            pairs, (inside, front, unlit) = (stop - start) * len(self.facets), found.tolist()
+            pairs, (inside, front, unlit) = (stop - start) * len(self.facets), pair_counts.tolist()
             counts += Counts(pairs, pairs - inside - unlit, inside - front, unlit)
             clock.lap("spectra")
             on_progress(counts.pairs)
@@ -235,9 +235,9 @@ class FacetSpreader:
         size = min(self.tiles_at_once, tiles.n_tiles) * len(at) * tiles.per_tile
         made, marks = device.empty(8 * size * self.channels), device.empty(size)
         for first in range(0, tiles.n_tiles, self.tiles_at_once):
-            here = min(self.tiles_at_once, tiles.n_tiles - first)
+            n_block = min(self.tiles_at_once, tiles.n_tiles - first)
             device.run(
-                self.amplitudes, (each * len(at), here), ends,
+                self.amplitudes, (each * len(at), n_block), ends,
                 launch_numbers(
                     KERNELS, "facet_amplitudes", n=n_nodes, n_offsets=n_offsets, second=self.second,
                     range=self.weights.range, first=first,
@@ -249,11 +249,11 @@ class FacetSpreader:
                 self.spread, (each * used, self.splits), ends,
                 launch_numbers(
                     KERNELS, "spread_facets", n=n, n_used=used, n_tiles=tiles.n_tiles, n_offsets=n_offsets,
-                    first=first, n_here=here, last=tiles.last, flush=self.flush, stride=self.stride,
+                    first=first, n_here=n_block, last=tiles.last, flush=self.flush, stride=self.stride,
                     origin=self.stride // 2,
                 ),
                 pulse, constants, tiles.references, tiles.offsets, made, marks, which_here, shares_here, seen,
-                moments, between, axes, self.reach, tiles.radius, self.table, rows, done, steps=here / self.splits,
+                moments, between, axes, self.reach, tiles.radius, self.table, rows, done, steps=n_block / self.splits,
             )  # fmt: skip
         counts = device.download(done, np.empty((3, self.splits, used), np.int32))
         return rows, counts.sum(axis=(1, 2), dtype=np.int64)

@@ -155,18 +155,18 @@ class HostTiling:
 
     def tiles(self, per_tile: int) -> DeviceTiles:
         """Tiles of `per_tile` scatterers on the device."""
-        found = self._on_device
-        if found is None or found.per_tile != per_tile:
+        device_tiles = self._on_device
+        if device_tiles is None or device_tiles.per_tile != per_tile:
             self._on_device = None  # frees the buffers of the other size first
             largest, self._tiled_largest = self._tiled_largest, None  # what the device holds is not needed here
             tiles, order = largest if largest and largest[0].per_tile == per_tile else self._tiled(per_tile)
             upload = self.device.upload
-            found = self._on_device = DeviceTiles(
+            device_tiles = self._on_device = DeviceTiles(
                 per_tile, tiles.n_tiles, order, upload(float_pairs.wide(tiles.references.T)),
                 upload(tiles.radius.astype(np.float32)), upload(tiles.offsets), upload(self._planes(order)),
                 len(order), per_tile - (len(order) - len(self)),
             )  # fmt: skip
-        return found
+        return device_tiles
 
     def _tiled(self, per_tile: int) -> tuple[Tiles, np.ndarray]:
         return tile_points(self.positions, self.center, per_tile, self.order)

@@ -127,8 +127,8 @@ def _overlapping(
     in_cell, occluder = in_cell[order], occluder[order]
     cell, receiver = _entries(receivers[0][inside], receivers[1][inside], least, most, size)
     begin, end = np.searchsorted(in_cell, cell, "left"), np.searchsorted(in_cell, cell, "right")
-    held = end > begin
-    cell, receiver, begin, end = cell[held], inside[receiver[held]], begin[held], end[held]
+    is_overlap = end > begin
+    cell, receiver, begin, end = cell[is_overlap], inside[receiver[is_overlap]], begin[is_overlap], end[is_overlap]
     wide = int(np.ceil((most - least)[1] / size[1])) + 1
     total = np.concatenate([[0], np.cumsum(end - begin)])
     first = 0

@@ -131,12 +131,12 @@ class SceneRays:
         """What a kernel finds on lines in the frame, float32 (n, 6): (n,) of type `kind`; `none` where nothing is."""
         out, tree = np.full(len(lines), none, kind), self._tree
         if tree is not None and len(lines):
-            found = self.device.empty(out.nbytes)
+            buffer = self.device.empty(out.nbytes)
             self.device.run(
                 self.device.kernel(KERNELS, kernel), (len(lines),), None,
-                tree.depth, self.device.upload(lines), tree.leaf, tree.node, tree.base, found,
+                tree.depth, self.device.upload(lines), tree.leaf, tree.node, tree.base, buffer,
             )  # fmt: skip
-            self.device.download(found, out)
+            self.device.download(buffer, out)
         return out
 
     def _distance(self, facet: np.ndarray, origins: np.ndarray, ahead: np.ndarray) -> np.ndarray:

@@ -133,11 +133,11 @@ def expand(samples: AmplitudeSamples, sines: tuple[float, float], tolerance: flo
         rows = _pivots(matrix[:, picked].conj().T, rank)
         inverse = np.linalg.pinv(made.reshape(-1, len(columns))[np.ix_(rows, picked)], rcond=1e-10)
         sine_j, frequency_j = (np.array([columns[i][axis] for i in picked]) for axis in (0, 1))
-        found = AspectExpansion(amplitudes, sine_j, frequency_j, some[rows // n_pol], rows % n_pol, inverse, 0.0)
-        error = samples.error(found)
+        expansion = AspectExpansion(amplitudes, sine_j, frequency_j, some[rows // n_pol], rows % n_pol, inverse, 0.0)
+        error = samples.error(expansion)
         best = min(best, error)
         if error <= tolerance:
-            return replace(found, error=error)
+            return replace(expansion, error=error)
         if rank == len(order):
             break
     raise ToleranceUnreachable(

@@ -196,13 +196,13 @@ def plan_transfer(
     for tried in TRIED:
         time.spend(compared_samples(some, n_functions, n_lags), n_lags)
         time.spend(table_samples(aspects, n_functions, *tried), n_lags)
-        made = transfer_tables(aspects, functions, *tried)
-        error = response_error(made, functions, factors[:TESTED], track, reach)
-        error = max(error, *(_seen_error(made, functions, group, track, reach) for group in groups), 0.0)
+        transfer = transfer_tables(aspects, functions, *tried)
+        error = response_error(transfer, functions, factors[:TESTED], track, reach)
+        error = max(error, *(_seen_error(transfer, functions, group, track, reach) for group in groups), 0.0)
         error *= SAFETY
         best = min(best, error)
         if error <= tolerance:
-            return replace(made, error=error)
+            return replace(transfer, error=error)
     raise ToleranceUnreachable(
         asked,
         None,

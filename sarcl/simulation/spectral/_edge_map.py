@@ -234,14 +234,15 @@ def edge_error(task: EdgeTask, transfer: AzimuthTransfer, nodes: EdgeNodes, plac
 
 def places_of_edges(amplitudes: ScattererAmplitudes, aspects: Aspects, track: StraightTrack) -> list[EdgePlaces]:
     """Where scatterers pass the hard edges of the beam that the track sees."""
-    found, edges = [], amplitudes.edges
+    places_by_edge, edges = [], amplitudes.edges
     if edges is not None:
         ends = ((edges.first, 1, aspects.low), (edges.last, -1, aspects.high))
         for (tangents, side, inner), hard in zip(ends, aspects.hard, strict=True):
             if hard:
                 inside = np.where(edges.seen, tangents, np.inf)
-                found.append(edge_places(inside, amplitudes.azimuth, amplitudes.slant_range, side, inner, track))
-    return [places for places in found if places is not None]
+                places = edge_places(inside, amplitudes.azimuth, amplitudes.slant_range, side, inner, track)
+                places_by_edge += [] if places is None else [places]
+    return places_by_edge
 
 
 def edge_map(

@@ -266,8 +266,8 @@ def _brightest(
     """Those of some scatterers (n,), with factors (n, J), that the middle or an end of the track sees brightest."""
     power = np.zeros(len(drawn))
     for place in (0.0, track.length / 2, track.length):
-        made = amplitudes(drawn, amplitudes.sines(place, drawn), sum(band) / 2)
-        power = np.maximum(power, (np.abs(made) ** 2).sum(axis=1))
+        amplitude = amplitudes(drawn, amplitudes.sines(place, drawn), sum(band) / 2)
+        power = np.maximum(power, (np.abs(amplitude) ** 2).sum(axis=1))
     best = np.argsort(-power, kind="stable")[:TESTED]
     return SeenScatterers(factors[best], amplitudes.azimuth[drawn[best]], amplitudes.slant_range[drawn[best]])
 
