@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -21,9 +22,9 @@ from ..scattering.facets import POLARIZATIONS, FacetSet, diagram_macros, vertica
 from ..scattering.pulse_nodes import every, plan_pulse_nodes
 from ..scattering.rough_pieces import RoughFacets
 from ..scene.triangles import centroids
+from ..visibility.illumination import Span
 from ._kernel_images import PatchSamples, sample_patches
 from ._piece_tiling import PieceTiling
-from ._pulse_levels import PulseLevels
 from .echo_request import EchoRequest
 from .spreading import (
     GROUP,
@@ -81,6 +82,45 @@ class TiledFacets(TiledScatterers):
             return sample_patches(positions, order, antennas, waveform, amplitudes)
 
         super().__init__(device, tiling, n_sums if facets.is_mirror else 0, patches)
+
+
+@dataclass(eq=False)
+class PulseLevels:
+    """Consecutive pulses from `start` to `stop` - 1, and levels of facets, uint8 (k,), at some moments among them.
+
+    A moment is the number of an array in `levels`.
+    """
+
+    start: int
+    levels: list[np.ndarray] = field(default_factory=list)
+    _moments: list[np.ndarray] = field(default_factory=list)
+    _between: list[np.ndarray] = field(default_factory=list)
+
+    @property
+    def stop(self) -> int:
+        """The pulse after the last."""
+        return self.start + sum(len(part) for part in self._between)
+
+    @property
+    def moments(self) -> np.ndarray:
+        """The moments around each pulse, int32 (n, 2)."""
+        return np.concatenate(self._moments)
+
+    @property
+    def between(self) -> np.ndarray:
+        """Where each pulse lies between its two moments, float32 (n,)."""
+        return np.concatenate(self._between)
+
+    def extend(self, span: Span, stop: int) -> int:
+        """Take the pulses of a span up to stop - 1 too; returns `stop`."""
+        pulses, which = np.arange(self.stop, stop), []
+        for level in (span.level, span.later):
+            if not self.levels or self.levels[-1] is not level:
+                self.levels.append(level)
+            which.append(len(self.levels) - 1)
+        self._moments.append(np.tile(np.array(which, np.int32), (len(pulses), 1)))
+        self._between.append(span.moments(pulses))
+        return stop
 
 
 class FacetSpreader:
