@@ -64,18 +64,20 @@ def make_plan(
                 return FieldPlan(double, error, allowed / (4 * np.pi * SHIFT_STEPS[fp64]))
         return None
 
-    found = met(tolerance)
-    if found is not None:
-        return found
+    plan = met(tolerance)
+    if plan is not None:
+        return plan
     least = fixed + _rounding(fp64)
     best = rounded_up(least if fp64 else max(FINE, least + U32))
     while best <= LARGEST_TOLERANCE and not met(best):
         best = rounded_up(1.05 * best)
     raise ToleranceUnreachable(
-        tolerance, askable(best), "rounding of path differences",
+        tolerance,
+        askable(best),
+        "rounding of path differences",
         how=f"on {device.info.name!r}{'' if fp64 else ' without float64'}, for points "
         f"{highest * farthest / SPEED_OF_LIGHT:.1e} wavelengths away and an array of {cycles:.1e}",
-    )  # fmt: skip
+    )
 
 
 def _rounding(double: bool) -> float:

@@ -66,9 +66,10 @@ def beam(
     points = x.reshape(-1, 3)
     kind = np.complex64 if tolerance >= FINE else np.complex128
     validation.room(
-        f"a field of {t.size:,} times at {len(points):,} points", float(t.size) * len(points) * np.dtype(kind).itemsize,
+        f"a field of {t.size:,} times at {len(points):,} points",
+        float(t.size) * len(points) * np.dtype(kind).itemsize,
         "give fewer times or positions at once",
-    )  # fmt: skip
+    )
     out = np.empty((t.size, len(points)), kind)
     if not out.size:
         return out.reshape(t.shape + x.shape[:-1])
@@ -158,11 +159,11 @@ class _Field:
         for lane_block in outer:
             lane = outer_table(lane_block)
             for row_block in inner:
-                made = self._sum(lane, kept or inner_table(row_block), len(row_block))[:, : len(lane_block)]
+                sums = self._sum(lane, kept or inner_table(row_block), len(row_block))[:, : len(lane_block)]
                 if along_times:
-                    out[np.ix_(lane_block, row_block)] = made.T
+                    out[np.ix_(lane_block, row_block)] = sums.T
                 else:
-                    out[np.ix_(row_block, lane_block)] = made
+                    out[np.ix_(row_block, lane_block)] = sums
 
     def _table(self, name: str, entries: np.ndarray, elements: np.ndarray, *, lanes_are: bool) -> tuple[Any, int]:
         """The table of kernel `name`, and its number of entries: whole tiles, the last one filled up with repeats."""
@@ -191,12 +192,12 @@ class _Field:
         planes = self.device.download(out, np.empty((tiles * used, 2, lane[1]), self.real))
         return np.asarray(planes[:rows, 0] + 1j * planes[:rows, 1])
 
-    def _kernel(self, name: str, used: int = ROWS) -> Any:
+    def _kernel(self, name: str, used: int = ROWS) -> object:
         macros = {"DOUBLE": int(self.plan.double), "ROWS": ROWS, "USED": used, "LANES": self.lane_width}
         fp64 = int(self.device.info.fp64)  # where it is slow too: `_wide` gives it as the plan counts its rounding
         return self.device.kernel("beam.cl", name, **macros, FLUSH=FLUSH, CHUNK=CHUNK, FP64=fp64)
 
-    def _wide(self, values: np.ndarray) -> Any:
+    def _wide(self, values: np.ndarray) -> object:
         """Values (k, n) as wide numbers on the device: float64, or pairs of float32 (k, 2, n)."""
         if self.device.info.fp64:
             return self.device.upload(values.astype(np.float64))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, Literal, NotRequired, TypedDict
+from typing import Literal, NotRequired, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -118,7 +118,7 @@ def _apparent(
     return np.asarray((r + g * kappa) * (np.sqrt(1 - sine**2) * unit(level) + sine * up))
 
 
-def _rotations(attitude: Any, n_pulses: int) -> np.ndarray:
+def _rotations(attitude: object, n_pulses: int) -> np.ndarray:
     turns = validation.array("attitude", attitude, np.float64, (n_pulses, 3, 3))
     off = np.abs(np.einsum("nij,nkj->nik", turns, turns) - np.eye(3)).max(axis=(1, 2))
     if off.max() > LINE:

@@ -19,8 +19,6 @@ import numpy as np
 from ..base.constants import SPEED_OF_LIGHT
 from ..base.rows import spread_over
 from ..base.vectors import unit
-from ..numerics.pulse_geometry import PulseGeometry
-from ..scene.scene import Scene
 from ..scene.triangles import areas, bisect, centroids, cut, edges
 from . import facet_kinds
 from ._facet_norm import (
@@ -34,8 +32,9 @@ from ._facet_norm import (
     longest_piece,
     path_beyond,
     random_pieces,
-)  # fmt: skip
+)
 from ._facet_sampling import drawn
+from .facet_kinds import FacetView
 from .mesh_quality.facet_groups import coplanar_groups
 from .physical_optics import lit_share, normals_and_areas, scattering_matrix, triangle_integral, turned
 
@@ -51,14 +50,9 @@ MOST_PHASE = np.pi  # rad along an edge: below, no direction exists in which the
 class CuttingError:
     """Errors of the coherent facets of a scene, cut to any edge; estimated from up to 200 of them."""
 
-    def __init__(
-        self, scene: Scene, mirror: np.ndarray, antennas: PulseGeometry, center: float, bandwidth: float,
-        polarizations: Sequence[str], vertical: np.ndarray, steep: Sequence[Ends] = (),
-    ) -> None:  # fmt: skip
-        """mirror  True for coherent facets (k,);  center, bandwidth  Hz;  vertical  (3,), of the polarisations
-
-        steep  antennas at other pulses at which errors are estimated too
-        """
+    def __init__(self, view: FacetView, steep: Sequence[Ends] = ()) -> None:
+        """steep  antennas at other pulses at which errors are estimated too"""
+        scene, mirror, antennas, vertical = view.scene, view.mirror, view.antennas, view.vertical
         some = np.flatnonzero(mirror)
         if len(some):
             length = np.maximum.reduce(edges(scene.triangles[some]))
@@ -70,16 +64,15 @@ class CuttingError:
         self._every = len(some) == int(mirror.sum()) and len(antennas.tx) <= FEW_PULSES
         if self._every and len(some):
             self._plane = coplanar_groups(scene, some, facet_kinds.random(scene)[some])
-            self._waves = lobe_wavenumbers(center, bandwidth, self._triangles, self._plane)
-        self._columns = [2 * "HV".index(name[0]) + "HV".index(name[1]) for name in polarizations]
+            self._waves = lobe_wavenumbers(view.center, view.bandwidth, self._triangles, self._plane)
+        self._columns = view.columns
         self._vertical = vertical[0], vertical[1], vertical[2]
-        highest = center + bandwidth / 2
-        eps = np.array([m.permittivity(highest) for m in scene.materials], np.complex128)
+        eps = np.array([m.permittivity(view.highest) for m in scene.materials], np.complex128)
         self._permittivity, self._reflectivity = eps[scene.material[some]], scene.reflectivity[some]
-        self._wavenumber = 2 * np.pi * highest / SPEED_OF_LIGHT
+        self._wavenumber = 2 * np.pi * view.highest / SPEED_OF_LIGHT
         ends = antennas.tx, antennas.rx
         gain_ends = [(ends[0][row], ends[1][row]) for row in spread_over(len(ends[0]), GAIN_PULSES)]
-        self._norm = FacetNorm(scene, mirror, gain_ends, center, bandwidth)
+        self._norm = FacetNorm(scene, mirror, gain_ends, view.center, view.bandwidth)
         self._ends = [(ends[0][row], ends[1][row]) for row in spread_over(len(ends[0]), ERROR_PULSES)]
         self._error_ends = [*self._ends, *steep]
         self._phase: float | None = None
@@ -203,11 +196,11 @@ class _Seen:
     def echoes(self, k: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """S I of the pieces with linear phase, about their centroids, complex128 (n, n polarisations), and the same as
         sums over their parts; k  rad/m (n,)."""
-        made = [
+        echoes_of_parts = [
             matrix * (triangle_integral(triangles, k[:, None] * q) * np.exp(-1j * k * path))[:, None]
             for triangles, matrix, q, path in self.parts
         ]
-        return made[0], np.asarray(sum(made[1:]))
+        return echoes_of_parts[0], np.asarray(sum(echoes_of_parts[1:]))
 
 
 def _halves(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -20,9 +20,9 @@ from ..base.boxes import box
 from ..base.rows import spread_over
 from ..base.vectors import unit
 from ..numerics.pulse_geometry import PulseGeometry
-from ..scene.scene import Scene
 from ..scene.triangles import areas, bisect, centroids, edges
 from ._facet_sampling import drawn
+from .facet_kinds import FacetView
 from .physical_optics import normals_and_areas, scattering_matrix, turned
 
 FACETS, PULSES = 200, 5  # samples
@@ -35,16 +35,13 @@ Ends = tuple[np.ndarray, np.ndarray]  # positions of transmitter and receiver, m
 
 
 class DirectionError:
-    """Errors of a scene's facets, relative to these at random phases; `mirror` (k,) tells those that are cut."""
+    """Errors of a scene's facets, relative to these at random phases, at the highest frequency of a band."""
 
-    def __init__(
-        self, scene: Scene, mirror: np.ndarray, antennas: PulseGeometry, frequency: float,
-        polarizations: Sequence[str], vertical: np.ndarray,
-    ) -> None:  # fmt: skip
-        """frequency  the highest, Hz;  vertical  unit vector (3,), of the polarisations"""
+    def __init__(self, view: FacetView) -> None:
+        scene, mirror, antennas, vertical = view.scene, view.mirror, view.antennas, view.vertical
         self._vertical = (float(vertical[0]), float(vertical[1]), float(vertical[2]))
-        self._columns = [2 * "HV".index(name[0]) + "HV".index(name[1]) for name in polarizations]
-        eps = np.array([m.permittivity(frequency) for m in scene.materials], np.complex128)
+        self._columns = view.columns
+        eps = np.array([m.permittivity(view.highest) for m in scene.materials], np.complex128)
         self._triangles, self._two_sided = scene.triangles, scene.two_sided
         self._permittivity, self._reflectivity = eps[scene.material], scene.reflectivity
         self.rounding = self._rounding([(antennas.tx[p], antennas.rx[p]) for p in spread_over(len(antennas), PULSES)])

@@ -62,9 +62,7 @@ def lobe_wavenumbers(center: float, bandwidth: float, triangles: np.ndarray, of:
 class FacetNorm:
     """Norms of coherent facets, estimated from the planes of up to 200 of them. Facets are perfect conductors here."""
 
-    def __init__(
-        self, scene: Scene, mirror: np.ndarray, ends: Sequence[Ends], center: float, bandwidth: float
-    ) -> None:  # fmt: skip
+    def __init__(self, scene: Scene, mirror: np.ndarray, ends: Sequence[Ends], center: float, bandwidth: float) -> None:
         """mirror  True for coherent facets (k,);  ends  antennas at some pulses;  center, bandwidth  Hz"""
         self._ends = ends
         group, self._weight = _sampled_planes(scene, np.flatnonzero(mirror))
@@ -148,9 +146,9 @@ class FacetNorm:
             q = unit(ends[0] - places) + unit(ends[1] - places)
             path = path_beyond(ends, middle[of], places - middle[of])
             for k in self._wavenumbers[self._group[of]].T:
-                made = group_sums(of, triangle_integral(parts, k[:, None] * q) * np.exp(-1j * k * path), len(triangles))
-                facets += np.abs(made) ** 2
-                planes += np.abs(group_sums(self._group, made, n_planes)) ** 2
+                sums = group_sums(of, triangle_integral(parts, k[:, None] * q) * np.exp(-1j * k * path), len(triangles))
+                facets += np.abs(sums) ** 2
+                planes += np.abs(group_sums(self._group, sums, n_planes)) ** 2
         return facets, planes
 
 

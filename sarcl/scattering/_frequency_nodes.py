@@ -5,17 +5,14 @@ docs/theory/facets.md derives it; tests/scattering/test_facet_engine.py holds it
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from ..base.rows import spread_over
 from ..numerics.polynomials import chebyshev
-from ..numerics.pulse_geometry import PulseGeometry
-from ..scene.scene import Scene
 from ..scene.triangles import areas, centroids, edges
 from ._facet_sampling import drawn, facets_at
 from .antenna_weights import MOST_NODES
+from .facet_kinds import FacetView
 from .facets import POLARIZATIONS, FacetSet
 
 FACETS, PULSES, FREQUENCIES = 96, 4, 24
@@ -23,10 +20,7 @@ SAFETY = 2.0  # the errors are estimated from samples
 BRIGHTEST = 0.1  # of sampled facets, left out of the reference power: 96 samples estimate the brightest tenth badly
 
 
-def over_band(
-    scene: Scene, mirror: np.ndarray, edge: float, finest: float, antennas: PulseGeometry, polarizations: Sequence[str],
-    vertical: np.ndarray, center: float, bandwidth: float,
-) -> dict[int, list[float]]:  # fmt: skip
+def over_band(view: FacetView, edge: float, finest: float) -> dict[int, list[float]]:
     """Relative errors of interpolating amplitudes over f^power between n = 1, 2, ... Chebyshev nodes: {power: [n]} for
     the powers 1 and 0; [0] is not used.
 
@@ -35,52 +29,47 @@ def over_band(
     apart: the pieces of a specular one add up in phase, and so do their errors, however many rough facets there are.
     """
     out = {power: [np.inf] + [0.0] * MOST_NODES for power in (1, 0)}
-    for which in (mirror, ~mirror):
+    for which in (view.mirror, ~view.mirror):
         if which.any():
-            part = _sample(scene, mirror, edge, finest, which)
+            part = _sample(view, edge, finest, which)
             for pulses in (PULSES, 16 * PULSES):  # more pulses where these see nothing
-                found = _errors(part, antennas, pulses, polarizations, vertical, center, bandwidth)
-                if found is not None:
-                    out = {power: np.maximum(errors, found[power]).tolist() for power, errors in out.items()}
+                sampled = _errors(part, view, pulses)
+                if sampled is not None:
+                    out = {power: np.maximum(errors, sampled[power]).tolist() for power, errors in out.items()}
                     break
     return out
 
 
-def crossed(
-    scene: Scene, mirror: np.ndarray, edge: float, finest: float, antennas: PulseGeometry, polarizations: Sequence[str],
-    vertical: np.ndarray, frequency: float,
-) -> float:  # fmt: skip
-    """Amplitudes in all polarisations over those in `polarizations`, root mean square over sampled facets and pulses,
-    where only cross-polarised ones are asked for; else 1. Large where little or nothing is sent back in these: rounding
+def cross_polarization_ratio(view: FacetView, edge: float, finest: float) -> float:
+    """Amplitudes in all polarisations over those in the ones of the view, root mean square over sampled facets and
+    pulses, where these are all cross-polarised; else 1. Large where little or nothing is sent back in these: rounding
     in float32 is that of the fields in all of them."""
-    if any(name[0] == name[1] for name in polarizations):
+    if any(name[0] == name[1] for name in view.polarizations):
         return 1.0
-    part, asked, whole = _sample(scene, mirror, edge, finest, np.ones(len(mirror), bool)), 0.0, 0.0
-    some = [POLARIZATIONS.index(name) for name in polarizations]
+    part, antennas = _sample(view, edge, finest, np.ones(len(view.mirror), bool)), view.antennas
+    columns, cross_power, total_power = [POLARIZATIONS.index(name) for name in view.polarizations], 0.0, 0.0
     for pulse in spread_over(len(antennas.tx), 16 * PULSES):
         ends = antennas.tx[pulse], antennas.rx[pulse]
-        made = part.amplitudes(*ends, np.array([frequency]), POLARIZATIONS, vertical)
-        power = (np.abs(made) ** 2).sum(axis=(0, 1))
-        asked, whole = asked + float(power[some].sum()), whole + float(power.sum())
-    if not whole:
+        amplitudes = part.amplitudes(*ends, np.array([view.center]), POLARIZATIONS, view.vertical)
+        powers = (np.abs(amplitudes) ** 2).sum(axis=(0, 1))
+        cross_power += float(powers[columns].sum())
+        total_power += float(powers.sum())
+    if not total_power:
         return 1.0
-    return float(np.sqrt(whole / asked)) if asked else float("inf")
+    return float(np.sqrt(total_power / cross_power)) if cross_power else float("inf")
 
 
-def _errors(
-    part: FacetSet, antennas: PulseGeometry, n_pulses: int, polarizations: Sequence[str], vertical: np.ndarray,
-    center: float, bandwidth: float,
-) -> dict[int, list[float]] | None:  # fmt: skip
-    """The same for n_pulses pulses along the track; None where none of them sees a facet."""
-    band = chebyshev(center, bandwidth, FREQUENCIES)
+def _errors(part: FacetSet, view: FacetView, n_pulses: int) -> dict[int, list[float]] | None:
+    """Errors as `over_band` returns them, for n_pulses pulses along the track; None where none of them sees a facet."""
+    band, antennas = chebyshev(view.center, view.bandwidth, FREQUENCIES), view.antennas
     transform = 2 / FREQUENCIES * np.cos(np.outer(np.arange(FREQUENCIES), np.arccos(chebyshev(0, 2, FREQUENCIES))))
     out = {power: [np.inf] + [0.0] * MOST_NODES for power in (1, 0)}
     seen = False
     for pulse in spread_over(len(antennas.tx), n_pulses):
         ends = antennas.tx[pulse], antennas.rx[pulse]
-        made = part.amplitudes(*ends, band, polarizations, vertical)
+        amplitudes = part.amplitudes(*ends, band, view.polarizations, view.vertical)
         for power, errors in out.items():
-            shaped = made / (band / center)[:, None, None] ** power
+            shaped = amplitudes / (band / view.center)[:, None, None] ** power
             tails = np.cumsum(np.abs(np.tensordot(transform, shaped, 1))[::-1], axis=0)[::-1]
             level = typical_power((np.abs(shaped) ** 2).mean(axis=0).sum(axis=1))
             if level:
@@ -96,16 +85,16 @@ def typical_power(powers: np.ndarray) -> float:
     return float(np.sort(powers)[: len(powers) - int(BRIGHTEST * len(powers))].sum())
 
 
-def _sample(scene: Scene, mirror: np.ndarray, edge: float, finest: float, which: np.ndarray) -> FacetSet:
+def _sample(view: FacetView, edge: float, finest: float, which: np.ndarray) -> FacetSet:
     """Facets, of those `which` (k,), each shrunk to the size of its pieces after cutting, somewhere on it.
 
     All count alike: large facets, which are drawn more often, are cut into more pieces.
     """
-    random = np.random.default_rng(0)
+    scene, random = view.scene, np.random.default_rng(0)
     some = np.flatnonzero(which)
     some = some[drawn(areas(scene.triangles[some]), FACETS, random)[0]]
     triangles = scene.triangles[some]
-    shrink = np.minimum(1.0, np.where(mirror[some], edge, finest) / np.maximum.reduce(edges(triangles)))
+    shrink = np.minimum(1.0, np.where(view.mirror[some], edge, finest) / np.maximum.reduce(edges(triangles)))
     middle = centroids(triangles)[:, None]
     inner = random.dirichlet((1.0, 1.0, 1.0), len(some))
     moved = np.einsum("ni,nij->nj", inner, triangles)[:, None] - middle

@@ -99,12 +99,12 @@ def _cut(triangles: np.ndarray, longest: np.ndarray) -> tuple[np.ndarray, np.nda
         return triangles, rows
     if long.all() and np.ptp(longest) == 0:
         return cut(triangles, float(longest[0]), MOST_FACETS)
-    made = [(triangles[~long], rows[~long])]
+    parts_and_rows = [(triangles[~long], rows[~long])]
     for length in np.unique(longest[long]).tolist():
         which = np.flatnonzero(long & (longest == length))
         parts, of = cut(triangles[which], length, MOST_FACETS)
-        made.append((parts, which[of]))
-    return np.concatenate([part for part, _ in made]), np.concatenate([of for _, of in made])
+        parts_and_rows.append((parts, which[of]))
+    return np.concatenate([part for part, _ in parts_and_rows]), np.concatenate([of for _, of in parts_and_rows])
 
 
 def with_facets(scene: Scene, triangles: np.ndarray, of: np.ndarray) -> Scene:

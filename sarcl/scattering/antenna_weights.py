@@ -49,21 +49,26 @@ class WeightError:
         """Raise ToleranceUnreachable where rounding leaves too little of the tolerance."""
         if not self.rounding <= ROUNDING * tolerance:
             raise ToleranceUnreachable(
-                tolerance, self.rounding / ROUNDING * (1 + 1e-9), "float32 gains of the antennas", "aim at the scene",
+                tolerance,
+                self.rounding / ROUNDING * (1 + 1e-9),
+                "float32 gains of the antennas",
+                "aim at the scene",
                 how="with these antennas: gains are in float32, and the echoes lie "
                 f"{20 * np.log10(self.peak_to_rms):.0f} dB below the beam's peak",
-            )  # fmt: skip
+            )
 
     def of(self, n: int, tolerance: float) -> float:
         """Error of points with n nodes; ToleranceUnreachable where it leaves too little of the tolerance."""
         error = self.rounding + float(self.over_band[n])
         if not error <= OVER_BAND * tolerance:
             raise ToleranceUnreachable(
-                tolerance, error / OVER_BAND * (1 + 1e-9), "gains over the band",
+                tolerance,
+                error / OVER_BAND * (1 + 1e-9),
+                "gains over the band",
                 "halve the band and add the halves' images",
                 how=f"with these antennas: gains change too much over the band to be interpolated between {n} "
                 "frequencies",
-            )  # fmt: skip
+            )
         return error
 
     def with_phase(self, n: int, of_phase: Sequence[float]) -> float:
@@ -188,7 +193,7 @@ class AntennaWeights:
             "SPREADING": int(self.radar is not None),
         }
 
-    def upload(self, device: Device) -> tuple[Any, int]:
+    def upload(self, device: Device) -> tuple[object, int]:
         """Patterns on a device, one after the other, and the index at which the second begins."""
         packed = [one.packed(self.frequency) for one in self.patterns] or [np.zeros(1, np.float32)]
         return device.upload(np.concatenate(packed)), len(packed[0])
@@ -202,7 +207,12 @@ class AntennaWeights:
 
 
 def weights_of(
-    antenna: Any, radar: Any, track: Trajectory, receiver: Trajectory | None, waveform: Waveform, center: np.ndarray
+    antenna: object,
+    radar: Radar | None,
+    track: Trajectory,
+    receiver: Trajectory | None,
+    waveform: Waveform,
+    center: np.ndarray,
 ) -> AntennaWeights:
     """The weights for the arguments `antenna` and `radar` of `sarcl.echo`; center  of the scene, m (3,).
 

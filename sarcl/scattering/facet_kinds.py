@@ -1,11 +1,46 @@
-"""Which facets of a scene are mirrors, which are random, and which are alike."""
+"""Facets of a scene that are mirrors, that are random, and that are alike; and how antennas see them."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
 import numpy as np
 
+from ..numerics.pulse_geometry import PulseGeometry
 from ..scene.material import COHERENT
 from ..scene.scene import Scene
+
+
+@dataclass(frozen=True, eq=False)
+class FacetView:
+    """Facets of a scene as antennas see them over a band, center and bandwidth in Hz, in some polarisations.
+
+    vertical  unit vector (3,): V lies in the plane of it and the line of sight
+    """
+
+    scene: Scene
+    antennas: PulseGeometry
+    center: float
+    bandwidth: float
+    polarizations: Sequence[str]
+    vertical: np.ndarray
+
+    @cached_property
+    def mirror(self) -> np.ndarray:
+        """Facets (k,) that have a coherent part: those that are cut to the edges of a plan."""
+        return coherent(self.scene)
+
+    @property
+    def highest(self) -> float:
+        """Highest frequency of the band, Hz."""
+        return self.center + self.bandwidth / 2
+
+    @property
+    def columns(self) -> list[int]:
+        """Elements of a flattened 2 x 2 scattering matrix, one per polarisation."""
+        return [2 * "HV".index(name[0]) + "HV".index(name[1]) for name in self.polarizations]
 
 
 def coherent(scene: Scene) -> np.ndarray:

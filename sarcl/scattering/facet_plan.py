@@ -5,7 +5,6 @@ docs/theory/facets.md derives each term; tests/scattering/test_facet_engine.py m
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,12 +21,13 @@ from ..scene.scene import Scene
 from ..scene.triangles import centroids, distances, edges
 from ._cutting_error import CuttingError
 from ._direction_error import DirectionError
-from ._frequency_nodes import crossed, over_band
+from ._frequency_nodes import cross_polarization_ratio, over_band
 from .antenna_weights import MOST_NODES, WeightError
-from .facet_kinds import coherent
+from .facet_kinds import FacetView
 
 GIGAHERTZ = 1e9  # amplitudes are divided by f in GHz, to stay clear of the smallest float32 numbers
 LADDER = 2.0 ** (1 / 2)  # ratio of the edge lengths that are tried
+PIECES = 1.5  # pieces per facet, over the square of its longest edge over theirs, about
 SHARE = 0.6  # of the tolerance, for the facets themselves; the rest is for ranges and interpolation
 MOST_FACETS = 50_000_000
 # Facets times pulses times samples that are added up in float64, in about a second, where float32 does not suffice, or
@@ -35,7 +35,7 @@ MOST_FACETS = 50_000_000
 FLOAT64_TERMS, WORTH_FLOAT32 = 4e6, 64
 # bytes per cut facet of an echo: corners, normals, materials and illumination on the host, measured with 1e6 facets
 FACET_BYTES = 512
-DARK = 30.0  # times less in the cross-polarised echoes that are asked for: then that is said
+DARK = 30.0  # amplitude ratio of all polarisations to the cross-polarised ones asked for, above which errors name it
 # rms error of amplitudes in float32, relative to their rms; 1.5e-7 measured by tests/scattering/test_facet_kernel.py
 KERNEL = 5e-7
 TO_CORNER = 2 / 3  # largest distance of a corner from the centroid, relative to the longest edge
@@ -77,134 +77,170 @@ class FacetPlan:
         return {"facets": round(self.n_facets), "facet edges, m": self.max_edge, **sums}
 
 
-def plan_facets(
-    tolerance: float, scene: Scene, antennas: PulseGeometry, center: float, bandwidth: float,
-    polarizations: Sequence[str], vertical: np.ndarray, finest: float = np.inf, cell: float = np.inf, *,
-    cut: bool = True, weights: WeightError | None = None, max_bytes: float = np.inf, profiles: float = 0.0,
-    terms: float = np.inf,
-) -> FacetPlan:  # fmt: skip
-    """The cheapest plan for facets whose error is at most SHARE of `tolerance`, relative to the facets as given.
+@dataclass(frozen=True)
+class CutLimits:
+    """Limits within which facets are cut.
 
-    center, bandwidth  of the waveform, Hz;  vertical  (3,), of the polarisations
-    finest              no edge of a coherent facet may be longer, m;  cell  edges, m, of facets with random parts
-    cut                False: facets stay as they are;  weights  errors of the antenna weights
+    finest     longest edge of a coherent facet, m;  cell  edges, m, of facets with random parts
+    cuts       False: facets stay as they are
+    max_bytes  that the cut facets may take; twice the facets of the scene are allowed whatever it is
     profiles   least error of the range profiles that cut facets are spread into
     terms      pulses times samples: with few of them and few facets, sums may be in float64; inf: never
-    max_bytes  that the cut facets may take; twice the facets of the scene are allowed whatever it is
-    ToleranceUnreachable where more facets would be needed than that, or than 50 million, with the best tolerance of
-    fewer.
     """
-    in_memory = max(2.0 * len(scene.triangles), max_bytes / FACET_BYTES)
-    most = min(float(MOST_FACETS), in_memory)
-    longest = np.maximum.reduce(edges(scene.triangles))
-    mirror, highest = coherent(scene), center + bandwidth / 2
-    top = float(longest[mirror].max(initial=0.0)) or float(longest.max())
-    bounds = box(scene.triangles.reshape(-1, 3))
-    distance = nearest(scene, antennas, bounds)
-    weights = weights or WeightError()
-    dark = crossed(scene, mirror, top, cell, antennas, polarizations, vertical, center)
-    best: tuple[float, FacetPlan] | None = None
-    exact: FacetPlan | None = None
-    directions = DirectionError(scene, mirror, antennas, highest, polarizations, vertical)
-    cutting = CuttingError(scene, mirror, antennas, center, bandwidth, polarizations, vertical, directions.steep)
-    if scene.roughness.any() or not mirror.any():
-        finest = min(finest, cell)
-    least, least_rounding, edge, fine, turn = np.inf, np.inf, min(top, finest), False, 0.0
 
-    def needed(gain: float, error: float) -> float:
-        """The tolerance that an error meets, with what range profiles of cut facets need beside it."""
-        return gain * max(error / SHARE, error + (profiles if gain > 1 else 0.0))
+    finest: float
+    cell: float
+    cuts: bool
+    max_bytes: float
+    profiles: float
+    terms: float
 
-    while True:
-        corner, gain = TO_CORNER * edge, 1.0
-        count = float(np.maximum(1.0, 1.5 * (longest / np.where(mirror, edge, min(cell, 1e30))) ** 2).sum())
-        if count > most or (exact is not None and count > WORTH_FLOAT32 * exact.n_facets):
-            break
-        small = count * terms <= FLOAT64_TERMS and dark <= DARK
-        rounding = _rounding(edge, highest, directions.rounding) * dark + weights.rounding
-        shape = weights.gradient * corner if mirror.any() else 0.0
-        if mirror.any():
-            turn, sharp = directions.turn(edge)
-            if needed(1.0, shape if small else rounding + shape) < tolerance:
-                gain = cutting.gain(edge if cut else np.inf)
-            bent = _spherical(corner, distance, highest)
-            turn = max(0.0, turn - corner / max(distance - corner, 1e-300))  # what `bent` has of directions
-            left = tolerance / gain * SHARE - shape - (0 if small else rounding)
-            shape += _at_most(cutting, edge, gain, bent, (turn, sharp), left)
-        if small and exact is None and gain * shape <= SHARE * tolerance:
-            exact = FacetPlan(edge, np.array([center]), shape, count, 1, gain, is_float64=True)
-        fixed = rounding + shape
-        least_rounding = min(least_rounding, needed(gain, rounding))
-        if needed(gain, fixed) < tolerance:
-            fine = True
-            band = over_band(
-                scene, mirror, edge, cell, antennas, polarizations, vertical, center, bandwidth
-            )  # fmt: skip
-            for power, n in ((power, n) for power in band for n in range(1, MOST_NODES + 1)):
-                error = fixed + weights.with_phase(n, band[power])
-                least = min(least, needed(gain, error))
-                if needed(gain, error) <= tolerance:
-                    per_node = cost_model.FACET_NODE + 4 * cost_model.FACET_TAP * len(polarizations)
-                    cost = count * (cost_model.FACET + n * per_node)
-                    if best is None or cost < best[0]:
-                        best = cost, FacetPlan(edge, chebyshev(center, bandwidth, n), error, count, power, gain)
-        else:
-            least = min(least, needed(gain, fixed))
-        settled = best is not None and count > 4 * best[1].n_facets
-        if settled or not cut or not mirror.any():
-            break
+
+def plan_facets(tolerance: float, view: FacetView, weights: WeightError, limits: CutLimits) -> FacetPlan:
+    """The cheapest plan for facets whose error is at most SHARE of `tolerance`, relative to the facets as given.
+
+    weights  errors of the antenna weights
+    ToleranceUnreachable where more facets would be needed than the limits allow, or than 50 million, with the best
+    tolerance of fewer.
+    """
+    search = _PlanSearch(tolerance, view, weights, limits)
+    edge = search.first_edge
+    while search.proceeds_beyond(edge):
         edge /= LADDER
-    if best is None and exact is not None:
-        return exact
-    if best is None and _rounding(0.0, highest, directions.rounding) * dark >= SHARE * tolerance and dark > DARK:
-        names = ", ".join(polarizations)
-        raise ToleranceUnreachable(
-            tolerance, None, "float32 integrals over facets", "ask for HH or VV",
-            how=f"in {names}, in which these facets send back {20 * np.log10(dark):.0f} dB less than in HH and VV",
-        )  # fmt: skip
-    reach = least * (1 + 1e-9) if np.isfinite(least) else None
-    if best is None and not cut:
-        raise ToleranceUnreachable(
-            tolerance, reach, "facets as large as they are", how=f"with facets of up to {top:.3g} m uncut"
-        )
-    if best is None and fine:
-        raise ToleranceUnreachable(
-            tolerance, reach, "amplitudes over the band", "halve the band and add the halves' images",
-            how=f"with facets' amplitudes interpolated between {MOST_NODES} frequencies",
-        )  # fmt: skip
-    if best is None and turn > SHARE * tolerance:
-        raise ToleranceUnreachable(
-            tolerance, reach, "change of H and V over facets seen along `vertical`",
-            "pass another vertical=(x, y, z), farther from the lines of sight",
-            how="where H and V change their directions over facets that an antenna sees along `vertical`",
-        )  # fmt: skip
-    if best is None and tolerance <= least_rounding < np.inf:  # inf: even the largest pieces are too many
-        raise ToleranceUnreachable(tolerance, reach, "float32 integrals over facets", how="with facets in float32")
-    if best is None:
-        how, remedy = f"without cutting these facets into more than {most:,.0f}", "take a smaller scene"
-        if in_memory < MOST_FACETS:
-            how += f" (about {FACET_BYTES} bytes per facet of max_bytes, {size_text(max_bytes)})"
+    plan = search.best or search.exact
+    if plan is None:
+        raise search.refusal()
+    return plan
+
+
+class _PlanSearch:
+    """Search for the cheapest plan, with facets cut to shorter and shorter edges.
+
+    best   cheapest plan with sums in float32 so far;  exact  that with the fewest facets and sums in float64
+    least, least_rounding  best tolerances so far, and those that float32 alone would allow
+    turn   error of one H and V per facet at the last edge;  interpolates  whether an edge was short enough but for the
+           interpolation over the band
+    """
+
+    def __init__(self, tolerance: float, view: FacetView, weights: WeightError, limits: CutLimits) -> None:
+        self.tolerance, self.view, self.weights, self.limits = tolerance, view, weights, limits
+        scene, mirror = view.scene, view.mirror
+        self.in_memory = max(2.0 * len(scene.triangles), limits.max_bytes / FACET_BYTES)
+        self.most = min(float(MOST_FACETS), self.in_memory)
+        self.longest = np.maximum.reduce(edges(scene.triangles))
+        self.top = float(self.longest[mirror].max(initial=0.0)) or float(self.longest.max())
+        self.distance = nearest(scene, view.antennas, box(scene.triangles.reshape(-1, 3)))
+        self.cross_ratio = cross_polarization_ratio(view, self.top, limits.cell)
+        self.directions = DirectionError(view)
+        self.cutting = CuttingError(view, self.directions.steep)
+        is_random = scene.roughness.any() or not mirror.any()
+        self.first_edge = min(self.top, limits.finest, limits.cell if is_random else np.inf)
+        self.best: FacetPlan | None = None
+        self.exact: FacetPlan | None = None
+        self.cost = self.least = self.least_rounding = np.inf
+        self.turn, self.interpolates = 0.0, False
+
+    def proceeds_beyond(self, edge: float) -> bool:
+        """Consider facets cut to `edge`, m. Whether shorter edges may allow a cheaper plan."""
+        mirror, limits = self.view.mirror, self.limits
+        sizes = self.longest / np.where(mirror, edge, min(limits.cell, 1e30))
+        count = float(np.maximum(1.0, PIECES * sizes**2).sum())
+        if count > self.most or (self.exact is not None and count > WORTH_FLOAT32 * self.exact.n_facets):
+            return False
+        is_small = count * limits.terms <= FLOAT64_TERMS and self.cross_ratio <= DARK
+        rounding = self._rounding(edge) + self.weights.rounding
+        gain, shape = self._shape(edge, 0.0 if is_small else rounding) if mirror.any() else (1.0, 0.0)
+        if is_small and self.exact is None and gain * shape <= SHARE * self.tolerance:
+            nodes = np.array([self.view.center])
+            self.exact = FacetPlan(edge, nodes, shape, count, power=1, gain=gain, is_float64=True)
+        self.least_rounding = min(self.least_rounding, self._required(gain, rounding))
+        error = rounding + shape
+        if self._required(gain, error) < self.tolerance:
+            self.interpolates = True
+            self._choose_nodes(edge, gain, error, count)
+        else:
+            self.least = min(self.least, self._required(gain, error))
+        is_settled = self.best is not None and count > 4 * self.best.n_facets
+        return limits.cuts and bool(mirror.any()) and not is_settled
+
+    def _required(self, gain: float, error: float) -> float:
+        """Tolerance that an error meets, with what range profiles of cut facets need beside it."""
+        return gain * max(error / SHARE, error + (self.limits.profiles if gain > 1 else 0.0))
+
+    def _rounding(self, edge: float) -> float:
+        """Error of facets in float32, relative to the polarisations that are asked for."""
+        return _rounding(edge, self.view.highest, self.directions.rounding) * self.cross_ratio
+
+    def _shape(self, edge: float, rounding: float) -> tuple[float, float]:
+        """Gain of facets cut to `edge`, m, and the error of one weight, phase slope and matrix per facet."""
+        corner, gain, shape = TO_CORNER * edge, 1.0, self.weights.gradient * (TO_CORNER * edge)
+        turn, is_sharp = self.directions.turn(edge)
+        if self._required(1.0, rounding + shape) < self.tolerance:
+            gain = self.cutting.gain(edge if self.limits.cuts else np.inf)
+        bound = _spherical(corner, self.distance, self.view.highest)
+        self.turn = max(0.0, turn - corner / max(self.distance - corner, 1e-300))  # what `bound` has of directions
+        room = self.tolerance / gain * SHARE - shape - rounding
+        return gain, shape + _at_most(self.cutting, edge, gain, bound, (self.turn, is_sharp), room)
+
+    def _choose_nodes(self, edge: float, gain: float, fixed: float, count: float) -> None:
+        """Take the cheapest number of frequency nodes whose error, beside a `fixed` one, meets the tolerance."""
+        view, weights = self.view, self.weights
+        per_node = cost_model.FACET_NODE + 4 * cost_model.FACET_TAP * len(view.polarizations)
+        band = over_band(view, edge, self.limits.cell)
+        for power, n in ((power, n) for power in band for n in range(1, MOST_NODES + 1)):
+            error = fixed + weights.with_phase(n, band[power])
+            self.least = min(self.least, self._required(gain, error))
+            cost = count * (cost_model.FACET + n * per_node)
+            if self._required(gain, error) <= self.tolerance and cost < self.cost:
+                nodes = chebyshev(view.center, view.bandwidth, n)
+                self.cost, self.best = cost, FacetPlan(edge, nodes, error, count, power, gain)
+
+    def refusal(self) -> ToleranceUnreachable:
+        """The error that names what keeps the facets from the tolerance."""
+        tolerance, float32 = self.tolerance, "float32 integrals over facets"
+        if self._rounding(0.0) >= SHARE * tolerance and self.cross_ratio > DARK:
+            names, ratio_db = ", ".join(self.view.polarizations), 20 * np.log10(self.cross_ratio)
+            how = f"in {names}, in which these facets send back {ratio_db:.0f} dB less than in HH and VV"
+            return ToleranceUnreachable(tolerance, None, float32, "ask for HH or VV", how=how)
+        reach = self.least * (1 + 1e-9) if np.isfinite(self.least) else None
+        if not self.limits.cuts:
+            how = f"with facets of up to {self.top:.3g} m uncut"
+            return ToleranceUnreachable(tolerance, reach, "facets as large as they are", how=how)
+        if self.interpolates:
+            how = f"with facets' amplitudes interpolated between {MOST_NODES} frequencies"
+            remedy = "halve the band and add the halves' images"
+            return ToleranceUnreachable(tolerance, reach, "amplitudes over the band", remedy, how=how)
+        if self.turn > SHARE * tolerance:
+            how = "where H and V change their directions over facets that an antenna sees along `vertical`"
+            remedy = "pass another vertical=(x, y, z), farther from the lines of sight"
+            limit = "change of H and V over facets seen along `vertical`"
+            return ToleranceUnreachable(tolerance, reach, limit, remedy, how=how)
+        if tolerance <= self.least_rounding < np.inf:  # inf: even the largest pieces are too many
+            return ToleranceUnreachable(tolerance, reach, float32, how="with facets in float32")
+        how, remedy = f"without cutting these facets into more than {self.most:,.0f}", "take a smaller scene"
+        if self.in_memory < MOST_FACETS:
+            memory = size_text(self.limits.max_bytes)
+            how += f" (about {FACET_BYTES} bytes per facet of max_bytes, {memory})"
             remedy += ", a track farther away, or a larger max_bytes"
-        raise ToleranceUnreachable(tolerance, reach, "number of facets", remedy, how=how)
-    return best[1]
+        return ToleranceUnreachable(tolerance, reach, "number of facets", remedy, how=how)
 
 
 def _at_most(
-    cutting: CuttingError, edge: float, gain: float, bound: float, turn: tuple[float, bool], left: float
+    cutting: CuttingError, edge: float, gain: float, bound: float, turn: tuple[float, bool], room: float
 ) -> float:
     """Error of linear phases and one scattering matrix over pieces, relative to these: measured, or by its bound, or
-    estimated where the bound is more than is left of the tolerance.
+    estimated where the bound is more than `room`, what remains of the tolerance.
 
     turn  error of one H and V per piece, beyond the bound, and whether these turn sharply within one: then measures
           and estimates, which suppose that errors fall with the square of the size, miss it
     """
     missed = turn[0] * turn[1]
-    if left <= missed:
+    if room <= missed:
         return bound + turn[0]
     measured = cutting.measured(edge)
     if measured is not None:
         return measured / gain + missed
-    return min(bound + turn[0], cutting.relative(edge) + missed) if bound + turn[0] >= left else bound + turn[0]
+    return min(bound + turn[0], cutting.relative(edge) + missed) if bound + turn[0] >= room else bound + turn[0]
 
 
 def nearest(scene: Scene, antennas: PulseGeometry, bounds: np.ndarray) -> float:

@@ -186,11 +186,7 @@ class FacetSet:
 
     def picked(self, some: np.ndarray) -> FacetSet:
         """These facets, in this order, without shadows."""
-        return FacetSet(
-            self.triangles[some], self.reflectivity[some], self.two_sided[some], self.material[some], self.materials,
-            None, self.kept[some], self.random[some] if len(self.random) else self.random,
-            incoherent=None if self.incoherent is None else self.incoherent[some],
-        )  # fmt: skip
+        return replace(self._some(some), illumination=None, lit_parts=None, lit_rows=None, sampled=None)
 
     def amplitudes(
         self, tx: np.ndarray, rx: np.ndarray, frequencies: np.ndarray, polarizations: Sequence[str],

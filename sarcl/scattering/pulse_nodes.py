@@ -75,9 +75,13 @@ def spaced(n_pulses: int, spacing: int, error: float = 0.0) -> PulseNodes:
 
 
 def plan_pulse_nodes(
-    part: FacetSet, weights: AntennaWeights, polarizations: Sequence[str], vertical: np.ndarray, frequency: float,
+    part: FacetSet,
+    weights: AntennaWeights,
+    polarizations: Sequence[str],
+    vertical: np.ndarray,
+    frequency: float,
     tolerance: float,
-) -> PulseNodes:  # fmt: skip
+) -> PulseNodes:
     """The widest nodes whose error is at most `tolerance`, relative to facets at random phases.
 
     frequency  the highest, Hz. For mirrors the spacing is also limited by MOST_TURN, whatever the samples say.
@@ -160,9 +164,13 @@ def _error(
 
 
 def _amplitudes(
-    part: FacetSet, weights: AntennaWeights, pulse: int, polarizations: Sequence[str], vertical: np.ndarray,
+    part: FacetSet,
+    weights: AntennaWeights,
+    pulse: int,
+    polarizations: Sequence[str],
+    vertical: np.ndarray,
     frequency: float,
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """Amplitudes at a pulse, weights of the antennas included, complex128 (k, n_polarizations)."""
     ends = weights.geometry.tx[pulse], weights.geometry.rx[pulse]
     sent = part.amplitudes(*ends, np.array([frequency]), polarizations, vertical)[0]

@@ -183,7 +183,7 @@ class RoughPieces:
             owners, paths = (self.device.upload(self.device.download(*part)[self.some]) for part in listed)
         return facets, owners, paths
 
-    def _walk(self, listed: int, *buffers: Any) -> Any:
+    def _walk(self, listed: int, *buffers: object) -> object:
         """Run walk_pieces on its last four buffers; returns that of the facets."""
         device, k = self.device, len(self.facets)
         facets, limit = device.upload(self.facets), np.array(ROUND * self.cell).view(np.uint64)
@@ -229,9 +229,9 @@ class RoughFacets(FacetSet):
             ((real + 1j * imag) / np.sqrt(2)).astype(np.complex64),
         )  # fmt: skip
 
-    def __getattr__(self, name: str) -> Any:
+    def __getattr__(self, name: str) -> np.ndarray:
         if name in ("triangles", "reflectivity", "two_sided", "material", "kept", "random"):
-            return getattr(self._host, name)
+            return np.asarray(getattr(self._host, name))
         raise AttributeError(f"{type(self).__name__} has no {name}")
 
     @property

@@ -4,25 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from functools import partial
 
 import numpy as np
 
 from ..base import boxes
 from ..base.constants import EDGE_ON
 from ..base.errors import warn
-from ..model.waveform import Waveform
 from ..numerics.pulse_geometry import PulseGeometry
+from ..opencl.device import Device
 from ..scene import triangles as geometry
 from ..scene.scene import Scene
 from ..scene.terrain import above, check_above, clear_of, facets_on
 from ..visibility.illumination import ALL_DARK, Illumination, lit
-from ..visibility.lit_parts import ON_PLANE, LitParts
+from ..visibility.lit_parts import ON_PLANE, FacetPieces, LitParts
 from ._random_surface import Pieces
 from .facet_kinds import coherent
 from .facets import FacetSet
 from .rough_pieces import RoughFacets, RoughPieces
 
+Progress = Callable[[int, int], object]  # called as progress(pulse, pulses)
 # pairs of piece and pulse, up to which rough facets are clipped too: about ten seconds
 FEW_LOOKS = 2e6
 # Facets count as small where their sides are less than so many times the distance below which corners lie in a plane;
@@ -61,125 +62,154 @@ def points_of(scene: Scene, skips: set[str], n_pulses: int) -> tuple[Points | No
     return Points(scene.positions[keep], scene.amplitudes[keep]) if keep.any() else None, left_out
 
 
+@dataclass(frozen=True)
+class ShadowRule:
+    """Rule by which shadows on facets are computed.
+
+    exact    lit parts of coherent facets are computed; False: all shadows are shares, from samples
+    sampled, accuracy  shadows on incoherent facets are shares; with this error relative to the norm of these facets
+    margin   m: antennas of channels stand up to this far from these;  max_bytes  for lit parts, and for shares
+    """
+
+    exact: bool
+    sampled: bool
+    accuracy: float
+    max_bytes: float
+    margin: float = 0.0
+
+
 def facets_of(
-    pieces: Pieces | RoughPieces, waveform: Waveform, antennas: PulseGeometry, *, shadows: bool, skips: set[str],
-    max_bytes: float, device: Any, progress: Callable[[str, int, int], object], exact: bool, sampled: bool,
-    accuracy: float, margin: float = 0.0,
-) -> tuple[FacetSet | None, dict[str, int]]:  # fmt: skip
+    pieces: Pieces | RoughPieces,
+    antennas: PulseGeometry,
+    *,
+    shadows: ShadowRule | None,
+    skips: set[str],
+    device: Device,
+    progress: Callable[[str, int, int], object],
+) -> tuple[FacetSet | None, dict[str, int]]:
     """Facets of a scene, displaced, culled and illuminated, and counts of pairs left out: reason -> count.
 
-    exact   lit parts of coherent facets are computed; False: all shadows are shares, from samples
-    sampled, accuracy  shadows on incoherent facets are shares; with this error relative to the norm of these facets
-    margin  m: antennas of channels stand up to this far from these
     progress  called as progress("scene", 2, 3) when facets are culled, progress("shadows", pulses done, pulses) while
               they are illuminated, progress("scene", 3, 3) then
     """
     if isinstance(pieces, RoughPieces):
-        if not (shadows and exact) or sampled:
-            return _rough_facets_of(
-                pieces, antennas, shadows=shadows, skips=skips, max_bytes=max_bytes, accuracy=accuracy,
-                progress=progress,
-            )  # fmt: skip
+        if shadows is None or not shadows.exact or shadows.sampled:
+            return _rough_facets_of(pieces, antennas, shadows=shadows, skips=skips, progress=progress)
         pieces = pieces.on_host
-    scene, n_pulses = pieces.scene, len(antennas.tx)
-    original = pieces.original
+    scene, original = pieces.scene, pieces.original
     check_antennas_above(original, antennas)
-    left_out = {"zero reflectivity": 0, "facing away": 0, "shadowed": 0}
-    normals = geometry.normals(scene.triangles)
-    triangles = scene.triangles
+    triangles, normals = scene.triangles, geometry.normals(scene.triangles)
     if pieces.height.any():
         triangles = triangles + (pieces.height[:, None] * normals)[:, None]
-    centers = geometry.centroids(triangles)
-    keep = np.ones(len(centers), bool)
-    if "zero reflectivity" in skips:
-        keep &= scene.reflectivity != 0
-        left_out["zero reflectivity"] = int((~keep).sum()) * n_pulses
-    if "facing away" in skips:
-        away = keep & ~scene.two_sided & faces_away(centers, normals, antennas)
-        left_out["facing away"] = int(away.sum()) * n_pulses
-        keep &= ~away
+    culling = _Culling(scene, skips, antennas, lambda which: int(which.sum()))
+    culling.cull(geometry.centroids(triangles), normals)
     progress("scene", 2, 3)
-    illumination, lit_parts = None, None
-
-    def report_shadows(done: int, total: int) -> None:
-        progress("shadows", done, total)
-
-    clipped = np.zeros(len(keep), bool)
-    if shadows and exact:  # rough facets too where they are few: their power is that of the lit part
-        clipped |= (coherent(scene) & ~pieces.incoherent) | (not sampled)
-    by_samples = keep & ~clipped & shadows
-    if shadows:
+    keep, lit_parts, illumination = culling.keep, None, None
+    is_clipped, is_sampled = np.zeros((2, len(keep)), bool)
+    report_shadows = partial(progress, "shadows")
+    if shadows is not None:
+        if shadows.exact:  # rough facets too where they are few: their power is that of the lit part
+            is_clipped = (coherent(scene) & ~pieces.incoherent) | (not shadows.sampled)
         _warn_of_reach(original.triangles)
-    casters = Casters.of(original, antennas) if by_samples.any() else None
-    if casters is not None and not casters.hides_any:
-        by_samples = np.zeros(len(keep), bool)
-    if casters is not None and casters.hides_any:
-        illumination = casters.light(
-            scene, pieces.of, by_samples, antennas, accuracy=accuracy, max_bytes=max_bytes, device=device,
-            progress=report_shadows,
-        )  # fmt: skip
-        left_out["shadowed"] = int((by_samples & illumination.dark).sum()) * n_pulses
-        keep &= ~(by_samples & illumination.dark)
-    if (keep & clipped).any():
-        lit_parts = LitParts(
-            device, scene.triangles, original.triangles, antennas.ends,
-            two_sided=scene.two_sided, wanted=keep & clipped, max_bytes=max_bytes, margin=margin,
-            given=original.triangles, of=pieces.of, progress=report_shadows,
-        )  # fmt: skip
-        left_out["shadowed"] += int((keep & lit_parts.dark).sum()) * n_pulses
-        if keep.any() and not (keep & ~lit_parts.dark).any():
-            warn(ALL_DARK)
-        keep &= ~lit_parts.dark
+        is_sampled = keep & ~is_clipped
+        casters = Casters.of(original, antennas) if is_sampled.any() else None
+        if casters is not None and casters.hides_any:
+            illumination = casters.light(scene, pieces.of, is_sampled, antennas, shadows, device, report_shadows)
+            culling.leave_out("shadowed", is_sampled & illumination.dark)
+        else:
+            is_sampled = np.zeros(len(keep), bool)
+        if (keep & is_clipped).any():
+            lit_parts = _lit_parts_of(pieces, keep & is_clipped, antennas, shadows, device, report_shadows)
+            if not (keep & ~lit_parts.dark).any():
+                warn(ALL_DARK)
+            culling.leave_out("shadowed", keep & lit_parts.dark)
     progress("scene", 3, 3)
     if not keep.any():
-        return None, left_out
+        return None, culling.left_out
     kept = slice(None) if keep.all() else keep  # no copies where all are kept
     return FacetSet(
-        triangles[kept], scene.reflectivity[kept], scene.two_sided[kept], scene.material[kept], scene.materials,
-        illumination, np.flatnonzero(keep), pieces.random[kept], lit_parts,
+        triangles[kept],
+        scene.reflectivity[kept],
+        scene.two_sided[kept],
+        scene.material[kept],
+        scene.materials,
+        illumination,
+        np.flatnonzero(keep),
+        pieces.random[kept],
+        lit_parts,
         None if lit_parts is None else np.where(lit_parts.partly, np.cumsum(lit_parts.partly) - 1, -1)[kept],
-        by_samples[kept], pieces.incoherent[kept] if pieces.incoherent.any() else None,
-    ), left_out  # fmt: skip
+        is_sampled[kept],
+        pieces.incoherent[kept] if pieces.incoherent.any() else None,
+    ), culling.left_out
+
+
+def _lit_parts_of(
+    pieces: Pieces, wanted: np.ndarray, antennas: PulseGeometry, rule: ShadowRule, device: Device, progress: Progress
+) -> LitParts:
+    """Lit parts of the pieces `wanted` (k,), which the facets that they are parts of occlude."""
+    scene, given = pieces.scene, pieces.original.triangles
+    facets = FacetPieces(scene.triangles, scene.two_sided, wanted, given, pieces.of)
+    options = {"max_bytes": rule.max_bytes, "margin": rule.margin}
+    return LitParts(device, facets, given, antennas.ends, progress=progress, **options)
 
 
 def _rough_facets_of(
-    pieces: RoughPieces, antennas: PulseGeometry, *, shadows: bool, skips: set[str], max_bytes: float, accuracy: float,
+    pieces: RoughPieces,
+    antennas: PulseGeometry,
+    *,
+    shadows: ShadowRule | None,
+    skips: set[str],
     progress: Callable[[str, int, int], object],
-) -> tuple[FacetSet | None, dict[str, int]]:  # fmt: skip
+) -> tuple[FacetSet | None, dict[str, int]]:
     """As `facets_of`, of pieces on a device: culled by the facets that they are parts of, unless shadows fall on
     them."""
     scene, n_pulses = pieces.scene, len(antennas.tx)
     check_antennas_above(scene, antennas)
-    left_out = {"zero reflectivity": 0, "facing away": 0, "shadowed": 0}
-    keep = np.ones(len(scene.triangles), bool)
-    if "zero reflectivity" in skips:
-        keep &= scene.reflectivity != 0
-        left_out["zero reflectivity"] = pieces.number_of(~keep) * n_pulses
-    if "facing away" in skips:
-        away = keep & ~scene.two_sided & faces_away(pieces.bounds, geometry.normals(scene.triangles), antennas)
-        left_out["facing away"] = pieces.number_of(away) * n_pulses
-        keep &= ~away
+    culling = _Culling(scene, skips, antennas, pieces.number_of)
+    culling.cull(pieces.bounds, geometry.normals(scene.triangles))
+    keep, left_out = culling.keep, culling.left_out
     progress("scene", 2, 3)
     casters = None
-    if shadows:
+    if shadows is not None:
         _warn_of_reach(scene.triangles)
         casters = Casters.of(scene, antennas)
-    if casters is None or not casters.hides_any or not keep.any():
+    if shadows is None or casters is None or not casters.hides_any or not keep.any():
         progress("scene", 3, 3)
         return RoughFacets(pieces.within(keep)) if keep.any() else None, left_out
-
-    def report_shadows(done: int, total: int) -> None:
-        progress("shadows", done, total)
-
     cut, of = pieces.cells()
-    illumination = casters.light(
-        cut, of, keep[of], antennas, accuracy=accuracy, max_bytes=max_bytes, device=pieces.device,
-        progress=report_shadows,
-    )  # fmt: skip
+    report_shadows = partial(progress, "shadows")
+    illumination = casters.light(cut, of, keep[of], antennas, shadows, pieces.device, report_shadows)
     seen = np.flatnonzero(keep[of] & ~illumination.dark)
     left_out["shadowed"] = (int(keep[of].sum()) - len(seen)) * n_pulses
     progress("scene", 3, 3)
     return RoughFacets(pieces.picked(seen), illumination, seen) if len(seen) else None, left_out
+
+
+class _Culling:
+    """Facets `keep` (k,) that may send something back, and counts of the other pairs with pulses: reason -> count.
+
+    number_of  counts the pieces of facets (k,) bool
+    """
+
+    def __init__(
+        self, scene: Scene, skips: set[str], antennas: PulseGeometry, number_of: Callable[[np.ndarray], int]
+    ) -> None:
+        self.scene, self.skips, self.antennas, self.number_of = scene, skips, antennas, number_of
+        self.keep = np.ones(len(scene.triangles), bool)
+        self.left_out = {"zero reflectivity": 0, "facing away": 0, "shadowed": 0}
+
+    def leave_out(self, reason: str, which: np.ndarray) -> None:
+        """Keep no facets of `which` (k,), all of them kept so far."""
+        self.left_out[reason] += self.number_of(which) * len(self.antennas.tx)
+        self.keep &= ~which
+
+    def cull(self, centers: np.ndarray, normals: np.ndarray) -> None:
+        """Leave out facets that reflect nothing or face away, where `skips` says so; arguments as of `faces_away`."""
+        if "zero reflectivity" in self.skips:
+            self.leave_out("zero reflectivity", self.scene.reflectivity == 0)
+        if "facing away" in self.skips:
+            away = self.keep & ~self.scene.two_sided & faces_away(centers, normals, self.antennas)
+            self.leave_out("facing away", away)
 
 
 def _warn_of_reach(triangles: np.ndarray) -> None:
@@ -222,20 +252,35 @@ class Casters:
         return bool(len(self.solid) or self.hidden_by_floor.any())
 
     def light(
-        self, pieces: Scene, of: np.ndarray, wanted: np.ndarray, antennas: PulseGeometry, *, accuracy: float,
-        max_bytes: float, device: Any, progress: Callable[[int, int], None],
-    ) -> Illumination:  # fmt: skip
+        self,
+        pieces: Scene,
+        of: np.ndarray,
+        wanted: np.ndarray,
+        antennas: PulseGeometry,
+        rule: ShadowRule,
+        device: Device,
+        progress: Progress,
+    ) -> Illumination:
         """Shares of pieces of a scene's facets `of` (k,), those `wanted` (k,), that antennas see past these casters.
 
         The pieces are without random heights: displaced along their normals they would occlude their neighbours.
         """
         ground = (self.floor, self.hidden_by_floor[of]) if len(self.floor) else None
         return lit(
-            pieces.triangles, antennas.tx, None if antennas.is_monostatic else antennas.rx,
-            two_sided=pieces.two_sided, wanted=wanted, tolerance=min(FINEST[0], FINEST[1] * accuracy),
-            accuracy=accuracy, weights=pieces.reflectivity**2 * geometry.areas(pieces.triangles), max_bytes=max_bytes,
-            occluders=self.solid, ground=ground, device=device, progress=progress,
-        )  # fmt: skip
+            pieces.triangles,
+            antennas.tx,
+            None if antennas.is_monostatic else antennas.rx,
+            two_sided=pieces.two_sided,
+            wanted=wanted,
+            tolerance=min(FINEST[0], FINEST[1] * rule.accuracy),
+            accuracy=rule.accuracy,
+            weights=pieces.reflectivity**2 * geometry.areas(pieces.triangles),
+            max_bytes=rule.max_bytes,
+            occluders=self.solid,
+            ground=ground,
+            device=device,
+            progress=progress,
+        )
 
 
 def check_antennas_above(scene: Scene, antennas: PulseGeometry) -> None:

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..base.validation import number
 from ..model.waveform import Waveform
-from ..numerics.pulse_geometry import PulseGeometry
 from ..opencl.device import Device
 from ..scene.scene import Scene
 from ._facet_norm import longest_piece
 from ._random_surface import Pieces, pieces_of
 from ._random_surface import cell_edge as cell_edge
 from .antenna_weights import WeightError
-from .facet_plan import FacetPlan, plan_facets
+from .facet_kinds import FacetView
+from .facet_plan import CutLimits, FacetPlan, plan_facets
 from .rough_pieces import RoughPieces
 
 
@@ -51,14 +50,17 @@ class Subdivision:
 
 
 def plan_cut(
-    scene: Scene, waveform: Waveform, antennas: PulseGeometry, polarizations: Sequence[str], vertical: np.ndarray,
-    max_edge: float | str | None, share: float, weights: WeightError, max_bytes: float = np.inf,
-    profiles: float = 0.0, terms: float = np.inf,
-) -> Subdivision:  # fmt: skip
+    share: float,
+    view: FacetView,
+    weights: WeightError,
+    waveform: Waveform,
+    max_edge: float | str | None,
+    **limits: float,
+) -> Subdivision:
     """How to cut a scene's facets within `share` of a tolerance.
 
-    max_edge  as `sarcl.echo` takes it;  weights  errors of the antenna weights;  max_bytes  for the cut facets
-    profiles, terms  as `plan_facets` takes them
+    weights  errors of the antenna weights;  max_edge  as `sarcl.echo` takes it
+    limits   max_bytes, profiles and terms of `CutLimits`
     ValueError for another max_edge, ToleranceUnreachable where the share cannot be met.
     """
     finest = np.inf
@@ -67,8 +69,6 @@ def plan_cut(
     elif max_edge not in ("auto", None):
         raise ValueError(f"max_edge is {max_edge!r}; give a length in m, 'auto', or None")
     cell = np.inf if max_edge is None else cell_edge(waveform)
-    plan = plan_facets(
-        share, scene, antennas, waveform.center, waveform.bandwidth, polarizations, vertical, finest, cell,
-        cut=max_edge is not None, weights=weights, max_bytes=max_bytes, profiles=profiles, terms=terms,
-    )  # fmt: skip
-    return Subdivision(plan, cell, max_edge is not None)
+    cuts = max_edge is not None
+    plan = plan_facets(share, view, weights, CutLimits(finest=finest, cell=cell, cuts=cuts, **limits))
+    return Subdivision(plan, cell, cuts)

@@ -29,7 +29,6 @@ For this folder alone:
     _piece_tiling      pieces of rough facets in tiles, on the device that cut them
     _planned_echoes    the method of echoes, and the plan of the scene for it
     _point_spreading   points to range profiles: a nonuniform FFT of type 1
-    _pulse_levels      what consecutive pulses see of facets, as the kernel reads it
     _single_channel    echoes of one transmitting and one receiving antenna
     _unseen_scene      refusal of scenes outside every beam or range window, before anything is planned
 """

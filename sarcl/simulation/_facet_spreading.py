@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,6 @@ from ..numerics import range_profiles
 from ..numerics.device_profiles import SpreadSamples
 from ..numerics.pulse_geometry import PulseGeometry
 from ..numerics.tile_constants import TileConstants
-from ..opencl.device import Device
 from ..opencl.launch_numbers import launch_numbers
 from ..scattering.antenna_weights import AntennaWeights
 from ..scattering.facet_plan import FacetPlan
@@ -22,10 +22,22 @@ from ..scattering.facets import POLARIZATIONS, FacetSet, diagram_macros, vertica
 from ..scattering.pulse_nodes import every, plan_pulse_nodes
 from ..scattering.rough_pieces import RoughFacets
 from ..scene.triangles import centroids
-from ._kernel_images import sample_patches
+from ..visibility.illumination import Span
+from ._kernel_images import PatchSamples, sample_patches
 from ._piece_tiling import PieceTiling
-from ._pulse_levels import PulseLevels
-from .spreading import GROUP, Band, Counts, HostTiling, TiledScatterers, Tiling, is_grouped, most_pulses, splits, terms
+from .echo_request import EchoRequest
+from .spreading import (
+    GROUP,
+    ChannelView,
+    Counts,
+    HostTiling,
+    TiledScatterers,
+    Tiling,
+    is_grouped,
+    most_pulses,
+    splits,
+    terms,
+)
 
 KERNELS = "spread_facets.cl"
 MOST_PULSES = 256  # pulses per block where amplitudes are interpolated: two blocks cannot share their nodes
@@ -40,10 +52,11 @@ class TiledFacets(TiledScatterers):
     """
 
     def __init__(
-        self, device: Device, facets: FacetSet, plan: FacetPlan, antennas: PulseGeometry, waveform: Waveform,
-        weights: AntennaWeights, polarizations: Sequence[str], vertical: np.ndarray,
+        self, request: EchoRequest, facets: FacetSet, plan: FacetPlan, antennas: PulseGeometry, waveform: Waveform,
+        weights: AntennaWeights,
     ) -> None:  # fmt: skip
-        """antennas, waveform, weights, polarizations  of all channels: samples of patches are computed for them"""
+        """antennas, waveform, weights  of all channels: samples of patches are computed for them"""
+        device = request.device
         self.facets, self.facet_plan, nodes = facets, plan, plan.nodes
         self.metal = all(np.isinf(m.conductivity) for m in facets.materials)
         roots = np.stack([facets.roots(float(f)) for f in nodes])
@@ -51,7 +64,7 @@ class TiledFacets(TiledScatterers):
 
         def amplitudes(some: np.ndarray, pulse: int, frequency: float) -> np.ndarray:
             ends, f = (antennas.tx[pulse], antennas.rx[pulse]), np.array([frequency])
-            sent = facets.picked(some).amplitudes(*ends, f, polarizations, vertical)[0]
+            sent = facets.picked(some).amplitudes(*ends, f, request.polarizations, request.vertical)[0]
             return np.asarray(sent * weights.weights(positions[some], pulse, frequency)[:, None])
 
         tiling: Tiling
@@ -63,10 +76,51 @@ class TiledFacets(TiledScatterers):
             tiling = HostTiling(
                 device, positions, lambda order: facets.planes(order, nodes, self.metal, self.dispersive)
             )
-        super().__init__(
-            device, tiling, len(antennas) * len(nodes) * len(polarizations) if facets.is_mirror else 0,
-            lambda order: sample_patches(positions, order, antennas, waveform, amplitudes),
-        )  # fmt: skip
+        n_sums = len(antennas) * len(nodes) * len(request.polarizations)
+
+        def patches(order: np.ndarray) -> PatchSamples:
+            return sample_patches(positions, order, antennas, waveform, amplitudes)
+
+        super().__init__(device, tiling, n_sums if facets.is_mirror else 0, patches)
+
+
+@dataclass(eq=False)
+class PulseLevels:
+    """Consecutive pulses from `start` to `stop` - 1, and levels of facets, uint8 (k,), at some moments among them.
+
+    A moment is the number of an array in `levels`.
+    """
+
+    start: int
+    levels: list[np.ndarray] = field(default_factory=list)
+    _moments: list[np.ndarray] = field(default_factory=list)
+    _between: list[np.ndarray] = field(default_factory=list)
+
+    @property
+    def stop(self) -> int:
+        """The pulse after the last."""
+        return self.start + sum(len(part) for part in self._between)
+
+    @property
+    def moments(self) -> np.ndarray:
+        """The moments around each pulse, int32 (n, 2)."""
+        return np.concatenate(self._moments)
+
+    @property
+    def between(self) -> np.ndarray:
+        """Where each pulse lies between its two moments, float32 (n,)."""
+        return np.concatenate(self._between)
+
+    def extend(self, span: Span, stop: int) -> int:
+        """Take the pulses of a span up to stop - 1 too; returns `stop`."""
+        pulses, which = np.arange(self.stop, stop), []
+        for level in (span.level, span.later):
+            if not self.levels or self.levels[-1] is not level:
+                self.levels.append(level)
+            which.append(len(self.levels) - 1)
+        self._moments.append(np.tile(np.array(which, np.int32), (len(pulses), 1)))
+        self._between.append(span.moments(pulses))
+        return stop
 
 
 class FacetSpreader:
@@ -77,64 +131,62 @@ class FacetSpreader:
     """
 
     def __init__(
-        self, held: TiledFacets, facets: FacetSet, antennas: PulseGeometry, bandwidth: float, frequencies: np.ndarray,
-        tolerance: float, budget: float, gated: bool, polarizations: Sequence[str], vertical: np.ndarray,
-        weights: AntennaWeights,
-    ) -> None:  # fmt: skip
-        """facets  as the antennas' pulses see them;  gated  leave out facets outside the range window
-        budget  bytes on the device;  frequencies  Hz, of the samples
-        """
-        self.device, self.held, self.facets, self.antennas, self.weights = held.device, held, facets, antennas, weights
-        self.gated, self.n_samples, facet_plan = gated, len(frequencies), held.facet_plan
+        self, tiled: TiledFacets, facets: FacetSet, view: ChannelView, tolerance: float, budget: float
+    ) -> None:
+        """facets  as the channel's pulses see them;  budget  bytes on the device"""
+        self.device, self.tiled, self.facets, self.gated = tiled.device, tiled, facets, view.gated
+        self.antennas, self.weights, self.n_samples = view.antennas, view.weights, len(view.frequencies)
+        antennas, facet_plan = view.antennas, tiled.facet_plan
         # a single antenna receives as V what is sent as H, exactly as it receives as H what is sent as V
         alike = {"VH": "HV"} if antennas.is_monostatic else {}
-        self.wanted = [alike.get(name, name) for name in polarizations]
-        self.made = [name for name in POLARIZATIONS if name in self.wanted]
-        left = tolerance - facet_plan.predicted_error
-        band = Band(self.n_samples, bandwidth, float(antennas.frequency.mean()))
-        room = left - band.least_tolerance(len(facets), left)  # what range profiles need comes first
+        self.columns = [alike.get(name, name) for name in view.polarizations]
+        self.polarizations = [name for name in POLARIZATIONS if name in self.columns]
+        room = tolerance - facet_plan.predicted_error
+        most = min(NODES_SHARE * room, room - view.band.least_tolerance(len(facets), room))  # profiles come first
         self.partly = facets.lit_parts is not None
         # edges of shadows move from pulse to pulse
-        self.pulse_nodes = every(len(antennas)) if self.partly else plan_pulse_nodes(
-            facets, weights, self.made, vertical, float(frequencies[-1]), min(NODES_SHARE * left, room)
-        )  # fmt: skip
-        left -= self.pulse_nodes.error
-        self.plan = held.plan(antennas, band, left, least_tolerance=0.0)
+        if self.partly:
+            self.pulse_nodes = every(len(antennas))
+        else:
+            highest = float(view.frequencies[-1])
+            names = self.polarizations
+            self.pulse_nodes = plan_pulse_nodes(facets, view.weights, names, view.vertical, highest, most)
+        self.plan = tiled.plan(antennas, view.band, room - self.pulse_nodes.error, least_tolerance=0.0)
         self.predicted_error = self.plan.predicted_error + facet_plan.predicted_error + self.pulse_nodes.error
-        self.basis = facet_plan.basis(frequencies).astype(np.float32)
-        self._upload(vertical, tolerance)
+        self.basis = facet_plan.basis(view.frequencies).astype(np.float32)
+        self._upload(view.vertical, tolerance)
         self.at_once, self.tiles_at_once = self._blocks(budget)
         self.levels_at_once = max(2, int(budget / 8 / self.tiles.n_offsets))
 
     def _upload(self, vertical: np.ndarray, tolerance: float) -> None:
         """Kernels, and what all blocks of pulses share on the device."""
-        device, held, plan, weights = self.device, self.held, self.plan, self.weights
-        self.tiles = held.tiles(plan.per_tile)
-        tiles, nodes, bistatic = self.tiles, held.facet_plan.nodes, not self.antennas.is_monostatic
+        device, scatterers, plan, weights = self.device, self.tiled, self.plan, self.weights
+        self.tiles = scatterers.tiles(plan.per_tile)
+        tiles, nodes, bistatic = self.tiles, scatterers.facet_plan.nodes, not self.antennas.is_monostatic
         self.grouped = is_grouped(device)
         macros = {**plan.macros(bistatic), **weights.macros(len(nodes)), "TILE": tiles.per_tile}
         macros |= {
-            "METAL": int(held.metal),
-            "DISPERSIVE": int(held.dispersive),
+            "METAL": int(scatterers.metal),
+            "DISPERSIVE": int(scatterers.dispersive),
             "ROUGH": int(self.facets.is_rough),
             "PULSE_NODES": self.pulse_nodes.order,
             "GROUPED": int(self.grouped),
             "PARTLY": int(self.partly),
             "SHADED": int(self.facets.illumination is not None),
-            **{name: int(name in self.made) for name in POLARIZATIONS},
+            **{name: int(name in self.polarizations) for name in POLARIZATIONS},
             **(diagram_macros() if self.facets.is_rough else {}),
         }
         self.constants = TileConstants(device, plan, bistatic=bistatic)
         self.amplitudes, self.spread = (
             device.kernel(KERNELS, name, **macros) for name in ("facet_amplitudes", "spread_facets")
         )
-        at_nodes = nodes / SPEED_OF_LIGHT, held.facet_plan.scales(), nodes / weights.frequency
+        at_nodes = nodes / SPEED_OF_LIGHT, scatterers.facet_plan.scales(), nodes / weights.frequency
         self.nodes = device.upload(np.stack(at_nodes).astype(np.float32))
         self.patterns, self.second = weights.upload(device)
         self.reach, self.up = device.upload(weights.limits), device.upload(vertical_axes(vertical))
         self.table = device.upload(plan.interpolator.table)
         self.flush = max(1, int(terms(tolerance) / tiles.per_tile))
-        self.channels = len(nodes) * len(self.made)
+        self.channels = len(nodes) * len(self.polarizations)
         self.stride = plan.length + 2 * range_profiles.padding(plan.interpolator)
         self.splits = splits(device, len(self.antennas), tiles.n_tiles, self.grouped)
         self.spectra_of = SpreadSamples(device, self.n_samples, plan.interpolator, plan.length)
@@ -150,7 +202,7 @@ class FacetSpreader:
         room = budget / 2
         pulses = max(1, min(most, int(room / 2 / per_pulse)) // lanes) * lanes
         n_nodes = pulses if spacing == 1 else pulses // spacing + self.pulse_nodes.order + 1
-        parts = 4 * (1 + 2 * len(self.held.facet_plan.nodes)) if self.partly else 0
+        parts = 4 * (1 + 2 * len(self.tiled.facet_plan.nodes)) if self.partly else 0
         per_tile = tiles.per_tile * (8 * self.channels + 1) * n_nodes
         if parts:
             pulses = (
@@ -170,14 +222,14 @@ class FacetSpreader:
         counts, first = Counts(), pulses[0]
         for levels in self._pulse_blocks(first, pulses[-1] + 1):
             start, stop = levels.start, levels.stop
-            rows, found = self._profiles(levels)
+            rows, pair_counts = self._profiles(levels)
             clock.lap("echo")
             spectra = self.spectra_of.of(rows, self.splits, (stop - start) * self.channels)
-            spectra = spectra.reshape(stop - start, len(self.made), len(self.basis), self.n_samples)
-            for i, name in enumerate(self.wanted):
+            spectra = spectra.reshape(stop - start, len(self.polarizations), len(self.basis), self.n_samples)
+            for i, name in enumerate(self.columns):
                 for m, weight in enumerate(self.basis):
-                    samples[start - first : stop - first, i] += spectra[:, self.made.index(name), m] * weight
-            pairs, (inside, front, unlit) = (stop - start) * len(self.facets), found.tolist()
+                    samples[start - first : stop - first, i] += spectra[:, self.polarizations.index(name), m] * weight
+            pairs, (inside, front, unlit) = (stop - start) * len(self.facets), pair_counts.tolist()
             counts += Counts(pairs, pairs - inside - unlit, inside - front, unlit)
             clock.lap("spectra")
             on_progress(counts.pairs)
@@ -223,9 +275,9 @@ class FacetSpreader:
         size = min(self.tiles_at_once, tiles.n_tiles) * len(at) * tiles.per_tile
         made, marks = device.empty(8 * size * self.channels), device.empty(size)
         for first in range(0, tiles.n_tiles, self.tiles_at_once):
-            here = min(self.tiles_at_once, tiles.n_tiles - first)
+            n_block = min(self.tiles_at_once, tiles.n_tiles - first)
             device.run(
-                self.amplitudes, (each * len(at), here), ends,
+                self.amplitudes, (each * len(at), n_block), ends,
                 launch_numbers(
                     KERNELS, "facet_amplitudes", n=n_nodes, n_offsets=n_offsets, second=self.second,
                     range=self.weights.range, first=first,
@@ -237,18 +289,18 @@ class FacetSpreader:
                 self.spread, (each * used, self.splits), ends,
                 launch_numbers(
                     KERNELS, "spread_facets", n=n, n_used=used, n_tiles=tiles.n_tiles, n_offsets=n_offsets,
-                    first=first, n_here=here, last=tiles.last, flush=self.flush, stride=self.stride,
+                    first=first, n_here=n_block, last=tiles.last, flush=self.flush, stride=self.stride,
                     origin=self.stride // 2,
                 ),
                 pulse, constants, tiles.references, tiles.offsets, made, marks, which_here, shares_here, seen,
-                moments, between, axes, self.reach, tiles.radius, self.table, rows, done, steps=here / self.splits,
+                moments, between, axes, self.reach, tiles.radius, self.table, rows, done, steps=n_block / self.splits,
             )  # fmt: skip
         counts = device.download(done, np.empty((3, self.splits, used), np.int32))
         return rows, counts.sum(axis=(1, 2), dtype=np.int64)
 
     def _parts(self, start: int, stop: int) -> np.ndarray:
         """Lit parts of the facets at pulses start ... stop - 1, as the kernel reads them: float32 (n, 1 + 2 m, .)."""
-        waves = 2 * np.pi * self.held.facet_plan.nodes / SPEED_OF_LIGHT
+        waves = 2 * np.pi * self.tiled.facet_plan.nodes / SPEED_OF_LIGHT
         light = self.facets.light(start, [end[start:stop] for end in self.antennas.ends], waves)
         order = self.tiles.order
         out = np.empty((stop - start, 1 + 2 * len(waves), len(order)), np.float32)
@@ -261,7 +313,7 @@ class FacetSpreader:
     def _constants(self, rows: np.ndarray, gated: bool) -> tuple[Any, Any, int]:
         """Packed antennas of pulses, the numbers that each shares with the tiles, and the pulses with blanks."""
         device, lanes, tiles = self.device, self.device.info.vector_width, self.tiles
-        packed = self.antennas.picked(rows).packed(self.held.center, self.plan.length, 0, len(rows), lanes)
+        packed = self.antennas.picked(rows).packed(self.tiled.center, self.plan.length, 0, len(rows), lanes)
         n = packed.shape[2]
         pulse, whole = device.upload(packed), (0, tiles.n_tiles)
         constants = self.constants.compute(pulse, n, tiles.references, tiles.radius, whole, tiles.n_tiles, int(gated))

@@ -32,8 +32,8 @@ class PieceTiling:
 
     def tiles(self, per_tile: int) -> DeviceTiles:
         """Tiles of `per_tile` pieces on the device."""
-        found = self._on_device
-        if found is None or found.per_tile != per_tile:
+        device_tiles = self._on_device
+        if device_tiles is None or device_tiles.per_tile != per_tile:
             self._on_device = None  # frees the buffers of the other size first
             self._placed = centers, planes = self._placed or self._place()
             tiles, on_device = self._bounds(per_tile)
@@ -44,12 +44,12 @@ class PieceTiling:
                 self._tile_numbers(per_tile, n_tiles), centers, on_device, offsets,
             )  # fmt: skip
             upload = self.device.upload
-            found = self._on_device = DeviceTiles(
+            device_tiles = self._on_device = DeviceTiles(
                 per_tile, n_tiles, self.order, upload(float_pairs.wide(tiles[:3])),
                 upload(tiles[3].astype(np.float32)), offsets, planes, self.stride,
                 len(self) - per_tile * (n_tiles - 1),
             )  # fmt: skip
-        return found
+        return device_tiles
 
     def _place(self) -> tuple[Any, Any]:
         return self.pieces.placed(*self._numbers, self.stride)
@@ -60,9 +60,13 @@ class PieceTiling:
         n_tiles = -(-len(self) // per_tile)
         tiles = self.device.empty(32 * n_tiles)
         self.device.run(
-            self.device.kernel(KERNELS, "tile_bounds"), in_groups(n_tiles), None, self._tile_numbers(per_tile, n_tiles),
-            self._placed[0], tiles,
-        )  # fmt: skip
+            self.device.kernel(KERNELS, "tile_bounds"),
+            in_groups(n_tiles),
+            None,
+            self._tile_numbers(per_tile, n_tiles),
+            self._placed[0],
+            tiles,
+        )
         return self.device.download(tiles, np.empty((4, n_tiles))), tiles
 
     def _tile_numbers(self, per_tile: int, n_tiles: int) -> np.ndarray:

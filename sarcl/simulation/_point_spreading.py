@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from ..model.waveform import Waveform
 from ..numerics import range_profiles
 from ..numerics.device_profiles import SpreadSamples
 from ..numerics.plan import Plan
+from ..numerics.polynomials import lagrange
 from ..numerics.pulse_geometry import PulseGeometry
 from ..numerics.tile_constants import TileConstants
 from ..opencl.device import Device
@@ -18,7 +20,7 @@ from ..opencl.launch_numbers import launch_numbers
 from ..scattering.antenna_weights import AntennaWeights
 from ..scattering.scatterers import Points
 from ._kernel_images import sample_patches
-from .spreading import GROUP, Counts, HostTiling, TiledScatterers, is_grouped, most_pulses, splits, terms
+from .spreading import GROUP, ChannelView, Counts, HostTiling, TiledScatterers, is_grouped, most_pulses, splits, terms
 
 
 def tiled_points(
@@ -30,75 +32,106 @@ def tiled_points(
         return (weights.weights(points.positions[some], pulse, frequency) * points.amplitudes[some])[:, None]
 
     return TiledScatterers(
-        device, HostTiling(device, points.positions, points.planes), len(antennas),
+        device,
+        HostTiling(device, points.positions, points.planes),
+        len(antennas),
         lambda order: sample_patches(points.positions, order, antennas, waveform, amplitudes),
-    )  # fmt: skip
+    )
 
 
-def spread_points(
-    points: TiledScatterers, plan: Plan, antennas: PulseGeometry, weights: AntennaWeights, nodes: np.ndarray,
-    basis: np.ndarray, tolerance: float, budget: float, gated: bool, samples: np.ndarray, pulses: Sequence[int],
-    clock: Clock, on_progress: Callable[[int], object],
-) -> Counts:  # fmt: skip
-    """Add points to samples (n_pulses, n_samples) of consecutive `pulses` of the antennas.
+@dataclass(frozen=True, eq=False)
+class PointSpreader:
+    """Points of one channel at one receiver, by a plan.
 
-    nodes    Hz (m,), frequencies at which gains are computed;  basis (m, n_samples)  interpolates between them
-    gated    leave out points outside the range window;  budget  bytes on the device
-    on_progress is called with the number of pairs of point and pulse that are done.
+    nodes   Hz (m,), frequencies at which gains are computed and between which they are interpolated
+    budget  bytes on the device
     """
-    device, lanes, n_samples = points.device, points.device.info.vector_width, samples.shape[1]
-    tiles = points.tiles(plan.per_tile)
-    bistatic, channels = not antennas.is_monostatic, len(nodes)
-    grouped = is_grouped(device)
-    macros = {**plan.macros(bistatic), **weights.macros(channels), "TILE": tiles.per_tile, "GROUPED": int(grouped)}
-    tile_constants = TileConstants(device, plan, bistatic=bistatic)
-    kernel = device.kernel("spread_points.cl", "spread", **macros)
-    table = device.upload(plan.interpolator.table)
-    ratios = device.upload((nodes / weights.frequency).astype(np.float32))
-    patterns, second = weights.upload(device)
-    reach = device.upload(weights.limits)
-    flush = max(1, int(terms(tolerance) / tiles.per_tile))
-    clock.lap("scene")
 
-    stride = plan.length + 2 * range_profiles.padding(plan.interpolator)
-    parts = splits(device, len(antennas), tiles.n_tiles, grouped)
-    spectra_of = SpreadSamples(device, n_samples, plan.interpolator, plan.length)
-    per_pulse = tile_constants.nbytes * tiles.n_tiles + (24 * stride * parts + spectra_of.row_bytes) * channels
-    at_once = max(1, min(most_pulses(device), int(budget / 2 / per_pulse)) // lanes) * lanes
-    counts, first, end = Counts(), pulses[0], pulses[-1] + 1
-    for start in range(first, end, at_once):
-        stop = min(start + at_once, end)
-        packed = antennas.packed(points.center, plan.length, start, stop, lanes)
-        n, used = packed.shape[2], stop - start
-        pulse = device.upload(packed)
-        whole = 0, tiles.n_tiles
-        constants = tile_constants.compute(pulse, n, tiles.references, tiles.radius, whole, tiles.n_tiles, int(gated))
-        rows, done = device.zeros(24 * parts * used * stride * channels), device.zeros(8 * parts * used)
+    points: TiledScatterers
+    plan: Plan
+    view: ChannelView
+    nodes: np.ndarray
+    tolerance: float
+    budget: float
+
+    def add(
+        self, samples: np.ndarray, pulses: Sequence[int], clock: Clock, on_progress: Callable[[int], object]
+    ) -> Counts:
+        """Add points to samples (n_pulses, n_samples) of consecutive `pulses` of the antennas.
+
+        on_progress is called with the number of pairs of point and pulse that are done.
+        """
+        kernel, n_nodes = _PointKernel(self), len(self.nodes)
+        basis = lagrange(self.nodes, self.view.frequencies).astype(np.float32)
+        clock.lap("scene")
+        counts, first, end = Counts(), pulses[0], pulses[-1] + 1
+        for start in range(first, end, kernel.pulses_at_once):
+            stop = min(start + kernel.pulses_at_once, end)
+            n_pulses = stop - start
+            profiles, n_added, n_dark = kernel.profiles(start, stop)
+            clock.lap("echo")
+            spectra = kernel.spectra_of.of(profiles, kernel.splits, n_pulses * n_nodes)
+            spectra = spectra.reshape(n_pulses, n_nodes, samples.shape[1])
+            block = samples[start - first : stop - first]
+            block += spectra[:, 0] if n_nodes == 1 else np.einsum("pmf,mf->pf", spectra, basis)
+            pairs = n_pulses * len(self.points)
+            counts += Counts(pairs, pairs - n_added - n_dark, 0, n_dark)
+            clock.lap("spectra")
+            on_progress(counts.pairs)
+        return counts
+
+
+class _PointKernel:
+    """Kernel of a spreader, and what all blocks of its pulses share on the device."""
+
+    def __init__(self, spreader: PointSpreader) -> None:
+        points, plan, antennas, weights = spreader.points, spreader.plan, spreader.view.antennas, spreader.view.weights
+        self.points, self.plan, self.view, self.device = points, plan, spreader.view, points.device
+        device, n_nodes, bistatic = points.device, len(spreader.nodes), not antennas.is_monostatic
+        self.tiles = tiles = points.tiles(plan.per_tile)
+        self.n_nodes, self.grouped = n_nodes, is_grouped(device)
+        macros = {**plan.macros(bistatic), **weights.macros(n_nodes), "TILE": tiles.per_tile}
+        self.tile_constants = TileConstants(device, plan, bistatic=bistatic)
+        self.kernel = device.kernel("spread_points.cl", "spread", **macros, GROUPED=int(self.grouped))
+        self.table = device.upload(plan.interpolator.table)
+        self.ratios = device.upload((spreader.nodes / weights.frequency).astype(np.float32))
+        self.patterns, self.second = weights.upload(device)
+        self.reach = device.upload(weights.limits)
+        self.flush = max(1, int(terms(spreader.tolerance) / tiles.per_tile))
+        self.stride = plan.length + 2 * range_profiles.padding(plan.interpolator)
+        self.splits = splits(device, len(antennas), tiles.n_tiles, self.grouped)
+        self.spectra_of = SpreadSamples(device, len(spreader.view.frequencies), plan.interpolator, plan.length)
+        per_profile = 24 * self.stride * self.splits + self.spectra_of.row_bytes
+        per_pulse = self.tile_constants.nbytes * tiles.n_tiles + per_profile * n_nodes
+        most, lanes = min(most_pulses(device), int(spreader.budget / 2 / per_pulse)), device.info.vector_width
+        self.pulses_at_once = max(1, most // lanes) * lanes
+
+    def profiles(self, start: int, stop: int) -> tuple[object, int, int]:
+        """Range profiles of pulses start ... stop - 1 on the device, as `SpreadSamples.of` takes them, and numbers of
+        pairs that were added, and out of the beam."""
+        device, tiles, weights, n_pulses = self.device, self.tiles, self.view.weights, stop - start
+        packed = self.view.antennas.packed(self.points.center, self.plan.length, start, stop, device.info.vector_width)
+        n, pulse, every_tile = packed.shape[2], device.upload(packed), (0, tiles.n_tiles)
+        constants = self.tile_constants.compute(
+            pulse, n, tiles.references, tiles.radius, every_tile, tiles.n_tiles, int(self.view.gated)
+        )
+        rows = device.zeros(24 * self.splits * n_pulses * self.stride * self.n_nodes)
+        done = device.zeros(8 * self.splits * n_pulses)
         axes = device.upload(weights.packed_axes(np.arange(start, stop)))
-        size, ends = (used, parts), (1, 1) if device.is_cpu else None
-        if grouped:
-            size, ends = (GROUP * used, parts), (GROUP, 1)
+        size, group = (n_pulses, self.splits), (1, 1) if device.is_cpu else None
+        if self.grouped:
+            size, group = (GROUP * n_pulses, self.splits), (GROUP, 1)
         device.run(
-            kernel, size, ends,
+            self.kernel, size, group,
             launch_numbers(
-                "spread_points.cl", "spread", n=n, n_used=used, n_tiles=tiles.n_tiles,
-                n_offsets=tiles.n_offsets, second=second, range=weights.range, last=tiles.last, flush=flush,
-                stride=stride, origin=stride // 2,
+                "spread_points.cl", "spread", n=n, n_used=n_pulses, n_tiles=tiles.n_tiles, n_offsets=tiles.n_offsets,
+                second=self.second, range=weights.range, last=tiles.last, flush=self.flush, stride=self.stride,
+                origin=self.stride // 2,
             ),
-            pulse, constants, tiles.references, tiles.offsets, tiles.planes, ratios, patterns, axes, reach,
-            tiles.radius, table, rows, done, steps=tiles.n_tiles / parts,
+            pulse, constants, tiles.references, tiles.offsets, tiles.planes, self.ratios, self.patterns, axes,
+            self.reach, tiles.radius, self.table, rows, done, steps=tiles.n_tiles / self.splits,
         )  # fmt: skip
         device.finish()
-        clock.lap("echo")
-        spectra = spectra_of.of(rows, parts, used * channels).reshape(used, channels, n_samples)
-        here = samples[start - first : stop - first]
-        if channels == 1:
-            here += spectra[:, 0]
-        else:
-            here += np.einsum("pmf,mf->pf", spectra, basis.astype(np.float32))
-        added, dark = device.download(done, np.empty((2, parts, used), np.int32)).sum(axis=(1, 2), dtype=np.int64)
-        pairs = used * len(points)
-        counts += Counts(pairs, pairs - int(added) - int(dark), 0, int(dark))
-        clock.lap("spectra")
-        on_progress(counts.pairs)
-    return counts
+        counts = device.download(done, np.empty((2, self.splits, n_pulses), np.int32))
+        n_added, n_dark = counts.sum(axis=(1, 2), dtype=np.int64).tolist()
+        return rows, n_added, n_dark

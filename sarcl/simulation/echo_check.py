@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from typing import Protocol
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from ..scattering.facets import FacetSet, Light
 from ..scattering.scatterers import Points
 from ._exact_facets import facet_samples, inside_window
 from .scene_echoes import SceneEchoes
+from .spreading import ChannelView
 
 CANDIDATES = 256  # pulses among which those that are checked are drawn
 MOST_DRAWS = 16  # pulses, and frequencies at each of them
@@ -22,6 +22,14 @@ FEWEST_DRAWS, MANY_FACETS = (4, 2), 2_000_000  # up to so many facets, and above
 FACET_SAMPLES = 256 * 20_000  # facets times samples: two or three seconds
 PER_FACET, PER_POINT = 5e-7, 6e-8  # s, to recompute the share of a facet or point in a sample, on one core
 PER_LIT_PART = 5e-3  # s, to recompute the lit part of a facet, past some ten occluders, on one core
+
+
+class PulseRows(Protocol):
+    """Samples in memory or in a file: of each pulse (n_polarizations, n_samples)."""
+
+    def __len__(self) -> int: ...
+
+    def __getitem__(self, pulse: int, /) -> np.ndarray: ...
 
 
 def draws_of(scene: SceneEchoes) -> int:
@@ -47,7 +55,7 @@ def worth_checking(scene: SceneEchoes, check: bool | None, channels: float = 1) 
 
 
 def measure_error(
-    scene: SceneEchoes, antennas: PulseGeometry, frequencies: np.ndarray, spectrum: np.ndarray, samples: Any
+    scene: SceneEchoes, antennas: PulseGeometry, frequencies: np.ndarray, spectrum: np.ndarray, samples: PulseRows
 ) -> float:
     """Relative error of 256 random samples (16 random pulses, 16 frequencies each) against the exact sum; of as many as
     take two or three seconds where there are more than 20 000 facets, and at least 16, or 4 above 2 million.
@@ -63,15 +71,15 @@ def measure_error(
     pulses, represented = _drawn(samples, draws, random)
     for p, share in zip(pulses.tolist(), represented.tolist(), strict=True):
         n = random.integers(0, len(frequencies), draws)
-        wanted, power = exact(scene, antennas, p, frequencies[n], scene.weights)
-        wanted *= spectrum[n]
-        wrong += share * float((np.abs(samples[p][:, n] - wanted) ** 2).sum())
-        right += share * float((np.abs(wanted) ** 2).sum())
+        echo, power = exact(scene, antennas, p, frequencies[n], scene.weights)
+        echo *= spectrum[n]
+        wrong += share * float((np.abs(samples[p][:, n] - echo) ** 2).sum())
+        right += share * float((np.abs(echo) ** 2).sum())
         random_phases += share * float((power * np.abs(spectrum[n]) ** 2).sum())
     return float(np.sqrt(wrong / max(right, random_phases))) if wrong else 0.0
 
 
-def _drawn(samples: Any, draws: int, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+def _drawn(samples: PulseRows, draws: int, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """Random pulses (draws,), and the number of pulses that each represents, up to a factor."""
     some = spread_over(len(samples), CANDIDATES)
     energy = np.array([np.linalg.norm(samples[p].astype(np.complex128, copy=False)) ** 2 for p in some.tolist()])
@@ -90,38 +98,21 @@ def exact(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Exact sums over a scene's scatterers (n_polarizations, n), and their power at random phases."""
     request = scene.request
+    view = ChannelView(antennas, weights, frequencies, 0.0, request.polarizations, request.vertical, gated=True)
     values = np.zeros((len(request.polarizations), len(frequencies)), np.complex128)
     powers = np.zeros(values.shape)
     for part in (scene.points, scene.facets):
         if part is not None:
-            value, power = _exact(part, antennas, pulse, frequencies, request.polarizations, request.vertical, weights)
+            value, power = _exact(part, view, pulse)
             values, powers = values + value, powers + power
     return values, powers
 
 
-def _exact(
-    part: Points | FacetSet,
-    antennas: PulseGeometry,
-    p: int,
-    frequencies: np.ndarray,
-    polarizations: Sequence[str],
-    vertical: np.ndarray,
-    beam: AntennaWeights,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Samples (n_polarizations, n) of pulse p at frequencies, Hz, and their power at random phases."""
+def _exact(part: Points | FacetSet, view: ChannelView, p: int) -> tuple[np.ndarray, np.ndarray]:
+    """Samples (n_polarizations, n) of pulse p at the frequencies, and their power at random phases."""
+    antennas, frequencies, polarizations = view.antennas, view.frequencies, view.polarizations
     if isinstance(part, FacetSet):
-        inside = inside_window(part, antennas, p)
-        return facet_samples(
-            part,
-            antennas,
-            p,
-            frequencies,
-            polarizations,
-            vertical,
-            beam,
-            inside,
-            _light(part, antennas, p, frequencies),
-        )
+        return facet_samples(part, view, p, inside_window(part, antennas, p), _light(part, antennas, p, frequencies))
     from ..reference.echo import echo as exact_echo
 
     tx, rx, places = antennas.tx[p], antennas.rx[p], part.positions
@@ -133,7 +124,7 @@ def _exact(
     place = (tx, rx, float(antennas.reference_range[p]))
     same = [i for i, name in enumerate(polarizations) if name[0] == name[1]]
     for j, f in enumerate(frequencies.tolist()):
-        a = part.amplitudes * inside * beam.weights(places, p, f)
+        a = part.amplitudes * inside * view.weights.weights(places, p, f)
         values[same, j] = exact_echo(places, a, frequencies[j : j + 1], *place)[0]
         powers[same, j] = (np.abs(a) ** 2).sum()
     return values, powers

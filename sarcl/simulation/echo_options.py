@@ -13,7 +13,7 @@ from .scene_options import SceneOptions
 
 Skip = Literal[
     "zero reflectivity", "facing away", "range window", "out of beam", "equal channels", "interpolated channels"
-]  # fmt: skip
+]
 CHANNELS = ("simultaneous", "separated")
 RECEIVE = ("reference", "own", "all")
 SKIPS = ("zero reflectivity", "facing away", "range window", "out of beam", "equal channels", "interpolated channels")

@@ -21,7 +21,7 @@ COPIES = 3  # of the rows' geometry, while a PhaseHistory is made of it: 320 byt
 SHARE = 0.25  # of max_bytes, for samples that are about to be written to a file
 
 
-def check_name(out: Any) -> None:
+def check_name(out: object) -> None:
     """TypeError where `out` is no name of a file, nor None."""
     if out is not None and not isinstance(out, (str, os.PathLike)):
         raise TypeError(f"out is a {type(out).__name__}; give the name of a file such as 'raw.h5', or None")
@@ -32,7 +32,7 @@ def bytes_of(shape: tuple[int, ...]) -> float:
     return float(np.prod(shape[:-1], dtype=float)) * (8.0 * shape[-1] + ROW_BYTES)
 
 
-def pulses_at_once(shape: tuple[int, ...], out: Any, budget: float) -> int:
+def pulses_at_once(shape: tuple[int, ...], out: object, budget: float) -> int:
     """Pulses whose samples are kept in memory together, of an output to memory or to the file `out`."""
     return shape[0] if out is None else max(1, int(SHARE * budget / (8.0 * np.prod(shape[1:], dtype=float))))
 
@@ -44,7 +44,7 @@ class EchoOutput:
     MemoryError gives the bytes that they would take; for a file, the errors of `output_paths.check_writable`.
     """
 
-    def __init__(self, shape: tuple[int, ...], out: Any, budget: float, window: tuple[float, float]) -> None:
+    def __init__(self, shape: tuple[int, ...], out: object, budget: float, window: tuple[float, float]) -> None:
         check_name(out)
         self.shape, self.writer, self.whole = shape, None, np.zeros(0, np.complex64)
         self.a_pulse = int(np.prod(shape[1:-1], dtype=np.int64))

@@ -68,11 +68,15 @@ def in_flight(
     box = corners(scene.bounds)
     _, _, down_there, up_there = antennas_in_flight(p[some, None], v[some, None], a[some, None], box)
     off = SPEED_OF_LIGHT * (down_there + up_there) / 2 - half_path(tx[some, None], rx[some, None], box)
-    return sends, hears, {
-        "receiver": "at the echo's arrival",
-        "stop_and_go_error_m": _rounded(SPEED_OF_LIGHT * (down + up) / 2 - still),
-        "arrival_error_m": _rounded(off),
-    }  # fmt: skip
+    return (
+        sends,
+        hears,
+        {
+            "receiver": "at the echo's arrival",
+            "stop_and_go_error_m": _rounded(SPEED_OF_LIGHT * (down + up) / 2 - still),
+            "arrival_error_m": _rounded(off),
+        },
+    )
 
 
 def _check_seen(antennas: np.ndarray, point: np.ndarray) -> None:
@@ -102,7 +106,7 @@ def row_fields(
     """Fields of a PhaseHistory that has a row per pulse and polarisation, pulse by pulse."""
     n, back = len(polarizations), track if receiver is None else receiver
 
-    def every(values: Any) -> Any:
+    def every(values: np.ndarray | None) -> np.ndarray | None:
         return values if n == 1 or values is None else np.repeat(values, n, axis=0)
 
     return {
@@ -117,7 +121,7 @@ def row_fields(
 
 
 def window(
-    scene: Scene, waveform: Waveform, tx: np.ndarray, rx: np.ndarray, reference_range: np.ndarray, asked: Any
+    scene: Scene, waveform: Waveform, tx: np.ndarray, rx: np.ndarray, reference_range: np.ndarray, asked: object
 ) -> tuple[float, float]:
     """The range gate (near, far) about the reference, m: as asked, or that which holds the scene's box plus 10 %."""
     if asked is not None:

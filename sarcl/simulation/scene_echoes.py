@@ -13,7 +13,7 @@ from ..base.errors import NothingSeen, ToleranceUnreachable
 from ..base.report import SMALLER_TOLERANCE, ErrorTerm, root_sum_square
 from ..model.waveform import Waveform
 from ..numerics.plan import Plan
-from ..numerics.polynomials import chebyshev, lagrange
+from ..numerics.polynomials import chebyshev
 from ..numerics.pulse_geometry import PulseGeometry
 from ..scattering.antenna_weights import AntennaWeights, WeightError
 from ..scattering.facets import FacetSet
@@ -21,11 +21,11 @@ from ..scattering.scatterers import Points
 from ..scattering.subdivision import Subdivision
 from ._exact_facets import ExactFacets
 from ._facet_spreading import FacetSpreader, TiledFacets
-from ._point_spreading import spread_points
+from ._point_spreading import PointSpreader
 from ._unseen_scene import OUTSIDE_BEAM, OUTSIDE_WINDOW
 from .echo_request import EchoRequest
 from .scene_plan import NODES
-from .spreading import Band, Counts, TiledScatterers
+from .spreading import Band, ChannelView, Counts, TiledScatterers
 
 UNKNOWN_SHADOWS = {"shadow edges": "sampled, not part of the error"}  # for the report
 
@@ -87,11 +87,8 @@ class SceneEchoes:
         steady, changing = self.facets.steady()
         if changing is None:
             return steady, None
-        request, plan = self.request, self.subdivision.plan
         tiled = tuple(
-            TiledFacets(
-                request.device, part, plan, antennas, waveform, self.weights, request.polarizations, request.vertical
-            )
+            TiledFacets(self.request, part, self.subdivision.plan, antennas, waveform, self.weights)
             for part in changing.split()
         )
         alone = replace(self, points=None, facets=changing, tiled_points=None, tiled_facets=tiled, shadow_terms=())
@@ -140,33 +137,31 @@ class SceneEchoes:
     ) -> ChannelEchoes:
         request = self.request
         weights = self.weights.at(antennas, slice(first, first + len(antennas)))
-        plan, nodes = None, np.zeros(0)
+        view = ChannelView(
+            antennas, weights, frequencies, waveform.bandwidth, request.polarizations, request.vertical, request.gated
+        )
+        points = None
         parts: list[tuple[ErrorTerm, dict[str, Any]]] = []
         spreaders: list[FacetSpreader | ExactFacets] = []
         stop = first + len(antennas)
         if self.points is not None and self.tiled_points is not None and request.same:
             nodes = chebyshev(waveform.center, waveform.bandwidth, self.n_nodes)
-            band = Band(len(frequencies), waveform.bandwidth, float(antennas.frequency.mean()))
-            plan, error = self._plan_points(self.tiled_points, antennas, band)
+            plan, error = self._plan_points(self.tiled_points, antennas, view.band)
+            tolerance = self.error_budget - error
+            points = PointSpreader(self.tiled_points, plan, view, nodes, tolerance, request.budget)
             parts.append(
                 (ErrorTerm("points", plan.predicted_error + error, SMALLER_TOLERANCE), plan.describe("spread"))
             )
         if self.facets is not None and self.subdivision is not None and self.subdivision.plan.is_float64:
             facets = self.facets if stop - first == self.n_pulses else self.facets.between(first, stop)
-            exact = ExactFacets(
-                facets, self.subdivision.plan, antennas, frequencies, request.gated, request.polarizations,
-                request.vertical, weights,
-            )  # fmt: skip
+            exact = ExactFacets(facets, self.subdivision.plan, view)
             words = exact.describe() | self.mesh_warnings | self.shadow_words
             parts.append((ErrorTerm("facets", self.gain * exact.predicted_error, SMALLER_TOLERANCE), words))
             spreaders.append(exact)
         spread = []
         for tiled in self.tiled_facets:
             facets = tiled.facets if stop - first == self.n_pulses else tiled.facets.between(first, stop)
-            spreader = FacetSpreader(
-                tiled, facets, antennas, waveform.bandwidth, frequencies, self.error_budget / self.gain,
-                request.budget, request.gated, request.polarizations, request.vertical, weights,
-            )  # fmt: skip
+            spreader = FacetSpreader(tiled, facets, view, self.error_budget / self.gain, request.budget)
             words = spreader.plan.describe("spread") | tiled.facet_plan.describe()
             words |= {"pulses per amplitude": spreader.pulse_nodes.spacing} | self.mesh_warnings | self.shadow_words
             spread.append((self.gain * spreader.predicted_error, words))
@@ -175,11 +170,9 @@ class SceneEchoes:
             parts.append((ErrorTerm("facets", max(error for error, _ in spread), SMALLER_TOLERANCE), spread[0][1]))
         chosen = max(parts, key=lambda part: part[0].value)[1] if parts else {}
         model = {"model": "stop and go, single scattering"} if parts else {}
-        return ChannelEchoes(
-            self, antennas, weights, frequencies, plan, nodes, tuple(spreaders),
-            (*(term for term, _ in parts), *self.shadow_terms),
-            {**model, **chosen, **(self.weights.describe(self.weight_error) if parts else {})},
-        )  # fmt: skip
+        words = {**model, **chosen, **(self.weights.describe(self.weight_error) if parts else {})}
+        error_terms = *(term for term, _ in parts), *self.shadow_terms
+        return ChannelEchoes(self, points, tuple(spreaders), error_terms, words)
 
     def check_seen(self, counts: Counts, near: float, far: float) -> None:
         """NothingSeen where nothing at all was added within the range window from near to far, m."""
@@ -208,17 +201,12 @@ class SceneEchoes:
 class ChannelEchoes:
     """The echoes of a scene in one channel at one receiver, as they are planned.
 
-    weights          as the channel's antennas see the scatterers;  frequencies  Hz, of its samples
-    point_plan       with gains at `nodes`, Hz, None where there are no points;  spreaders  of facets
+    points           spreader of points, None where there are none;  spreaders  of facets
     error_terms      relative, of the channel;  plan  in words, of its part with the largest error
     """
 
     scene: SceneEchoes
-    antennas: PulseGeometry
-    weights: AntennaWeights
-    frequencies: np.ndarray
-    point_plan: Plan | None
-    nodes: np.ndarray
+    points: PointSpreader | None
     spreaders: tuple[FacetSpreader | ExactFacets, ...]
     error_terms: tuple[ErrorTerm, ...]
     plan: dict[str, Any]
@@ -239,13 +227,8 @@ class ChannelEchoes:
             request.report("echo", done + counts.pairs + n, total)
 
         on_progress(0)
-        if self.point_plan is not None and scene.tiled_points is not None:
-            error = scene.weight_error.of(len(self.nodes), scene.error_budget)
-            counts = spread_points(
-                scene.tiled_points, self.point_plan, self.antennas, self.weights, self.nodes,
-                lagrange(self.nodes, self.frequencies), scene.error_budget - error, request.budget, request.gated,
-                samples[:, request.same[0]], pulses, request.clock, on_progress,
-            )  # fmt: skip
+        if self.points is not None:
+            counts = self.points.add(samples[:, request.same[0]], pulses, request.clock, on_progress)
             samples[:, request.same[1:]] = samples[:, request.same[:1]]
         elif scene.points is not None:  # in these polarisations points send nothing back
             counts = Counts(len(scene.points) * len(samples))

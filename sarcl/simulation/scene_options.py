@@ -14,7 +14,7 @@ from ..model.radar import Radar
 from .track_options import TrackOptions
 
 
-def _shadows(name: str, asked: Any) -> bool:
+def _shadows(name: str, asked: object) -> bool:
     if isinstance(asked, str) and asked == "embree":
         raise ValueError(
             "shadows is 'embree'; rays of Embree were taken out, since sarcl's own became faster and exact: give True"
@@ -22,7 +22,7 @@ def _shadows(name: str, asked: Any) -> bool:
     return flag(name, asked)
 
 
-def _max_edge(name: str, asked: Any) -> float | str | None:
+def _max_edge(name: str, asked: object) -> float | str | None:
     if isinstance(asked, str):
         return choice(name, asked, ("auto",))
     return None if asked is None else number(name, asked, above=0)

@@ -15,6 +15,7 @@ from ..numerics.plan import LEAST_TOLERANCE, PROFILES
 from ..numerics.pulse_geometry import PulseGeometry
 from ..scattering.antenna_weight_error import weight_error as error_of_weights
 from ..scattering.antenna_weights import AntennaWeights, WeightError
+from ..scattering.facet_kinds import FacetView
 from ..scattering.facet_plan import MOST_FACETS
 from ..scattering.scatterers import samples_shadows as counts_shadows
 from ..scattering.subdivision import Subdivision, cell_edge, plan_cut
@@ -115,41 +116,45 @@ def samples_shadows(request: EchoRequest, seen: SeenScene) -> bool:
 
 
 def plan_scene(
-    request: EchoRequest, seen: SeenScene, weight_error: WeightError, bands: Iterable[Band], tolerance: float,
+    request: EchoRequest,
+    seen: SeenScene,
+    weight_error: WeightError,
+    bands: Iterable[Band],
+    tolerance: float,
     max_edge: float | str | None,
-) -> Subdivision | None:  # fmt: skip
+) -> Subdivision | None:
     """How a scene's facets are cut for `tolerance`, None where there are none.
 
     ToleranceUnreachable where gains, facets, or samples of one of `bands` exceed their shares of it.
     """
     scene, antennas = seen.scene, seen.antennas
-    share, made = share_of(request, seen, tolerance), None
+    share, subdivision = share_of(request, seen, tolerance), None
     weight_error.check(share)
     if len(scene.triangles):
         terms = len(antennas) * sum(band.n_samples for band in bands) or np.inf
         profiles = max((CUT_PROFILES * band.least_tolerance(min(PER_TILE), 0.0) for band in bands), default=0.0)
-        made = plan_cut(
-            scene, seen.waveform, antennas, request.polarizations, request.vertical, max_edge, share, weight_error,
-            request.host, profiles, terms,
-        )  # fmt: skip
-        left = share / made.gain - made.plan.predicted_error
-        if not made.plan.is_float64:  # pieces are not counted yet
-            _profiles_fit(bands, left, len(scene.triangles) * MOST_FACETS, share / made.gain)
+        center, bandwidth = seen.waveform.center, seen.waveform.bandwidth
+        view = FacetView(scene, antennas, center, bandwidth, request.polarizations, request.vertical)
+        limits = {"max_bytes": request.host, "profiles": profiles, "terms": terms}
+        subdivision = plan_cut(share, view, weight_error, seen.waveform, max_edge, **limits)
+        room = share / subdivision.gain - subdivision.plan.predicted_error
+        if not subdivision.plan.is_float64:  # pieces are not counted yet
+            _profiles_fit(bands, room, len(scene.triangles) * MOST_FACETS, share / subdivision.gain)
     n_points = len(scene.amplitudes)
     if "zero reflectivity" in request.skips:
         n_points = int(np.count_nonzero(scene.amplitudes))
     if n_points and request.same:
-        left = share - weight_error.of(weight_error.nodes(NODES * share), share)
-        _profiles_fit(bands, left, n_points, share, LEAST_TOLERANCE)
-    return made
+        room = share - weight_error.of(weight_error.nodes(NODES * share), share)
+        _profiles_fit(bands, room, n_points, share, LEAST_TOLERANCE)
+    return subdivision
 
 
-def _profiles_fit(bands: Iterable[Band], left: float, n: int, share: float, least: float = 0.0) -> None:
-    """ToleranceUnreachable where range profiles of n scatterers need more than is `left` of a share of it."""
+def _profiles_fit(bands: Iterable[Band], room: float, n: int, share: float, least: float = 0.0) -> None:
+    """ToleranceUnreachable where range profiles of n scatterers need more than `room`, the rest of a share of it."""
     for band in bands:
-        needed = max(band.least_tolerance(n, left), least)
-        if left < needed:
-            raise ToleranceUnreachable(share, needed + (share - left), PROFILES, how="in complex64")
+        error = max(band.least_tolerance(n, room), least)
+        if room < error:
+            raise ToleranceUnreachable(share, error + (share - room), PROFILES, how="in complex64")
 
 
 def _meets(plan: Callable[[], object]) -> bool:

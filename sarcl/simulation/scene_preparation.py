@@ -11,7 +11,7 @@ from ..base.tolerances import askable, rounded_up
 from ..scattering.antenna_weights import AntennaWeights
 from ..scattering.facets import FacetSet
 from ..scattering.mesh_quality import facet_error, speckle_contrast
-from ..scattering.scatterers import Points, facets_of, points_of
+from ..scattering.scatterers import Points, ShadowRule, facets_of, points_of
 from ..scattering.subdivision import Subdivision
 from ..scene.scene import Scene
 from ._facet_spreading import TiledFacets
@@ -47,12 +47,21 @@ def prepare_scene(plan: ScenePlan, *, tiled: bool = True, exact: bool = True) ->
         speckle = speckle_contrast.judge(cells, seen.antennas, seen.waveform, represents)
         mesh_warnings = warn_of_curves(plan) | _warned(speckle)
         request.report("scene", 1, 3)
+        shadows = ShadowRule(
+            exact=exact,
+            sampled=samples_shadows(request, seen),
+            accuracy=SHADOWS * request.tolerance / parts_of(seen.scene),
+            max_bytes=request.budget / 4,
+            margin=seen.margin,
+        )
         facets, left_out = facets_of(
-            pieces, seen.waveform, seen.antennas, shadows=request.shadows, skips=request.skips,
-            max_bytes=request.budget / 4, device=request.device, progress=request.report,
-            exact=exact and request.shadows, sampled=samples_shadows(request, seen),
-            accuracy=SHADOWS * request.tolerance / parts_of(seen.scene), margin=seen.margin,
-        )  # fmt: skip
+            pieces,
+            seen.antennas,
+            shadows=shadows if request.shadows else None,
+            skips=request.skips,
+            device=request.device,
+            progress=request.report,
+        )
         skipped = {why: skipped.get(why, 0) + n for why, n in left_out.items()}
     _check_left(request, points, facets, skipped)
     if points is not None:
@@ -103,11 +112,9 @@ def _tiled_facets(
     """Facets in tiles on the device, partly lit ones apart from the others; none where their sums are in float64."""
     if facets is None or subdivision is None or subdivision.plan.is_float64:
         return ()
-    request, seen, rule = plan.request, plan.seen, subdivision.plan
+    seen = plan.seen
     return tuple(
-        TiledFacets(
-            request.device, part, rule, seen.antennas, seen.waveform, weights, request.polarizations, request.vertical
-        )
+        TiledFacets(plan.request, part, subdivision.plan, seen.antennas, seen.waveform, weights)
         for part in facets.split()
     )
 
@@ -120,9 +127,10 @@ def _shadow_terms(request: EchoRequest, scene: Scene, facets: FacetSet | None) -
     share, light = SHADOWS / parts_of(scene), facets.illumination
     if light.error > share * request.tolerance:
         raise ToleranceUnreachable(
-            request.tolerance, askable(rounded_up(1.05 * light.reached / share)),
+            request.tolerance,
+            askable(rounded_up(1.05 * light.reached / share)),
             "shadow edges on rough facets, counted in samples at single pulses",
-        )  # fmt: skip
+        )
     remedy = "a smaller tolerance: it asks for "
     return (
         ErrorTerm("shadow edges", light.sampling, remedy + "more samples of each facet"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
@@ -18,6 +18,7 @@ from ..numerics.plan import LEAST_TOLERANCE, Plan, carrier_steps, cheapest, leas
 from ..numerics.pulse_geometry import PulseGeometry
 from ..numerics.tiles import Tiles, tile_points
 from ..opencl.device import Device
+from ..scattering.antenna_weights import AntennaWeights
 from ._kernel_images import PatchSamples
 
 PER_TILE = (256, 64)
@@ -41,9 +42,11 @@ class Counts:
 
     def __add__(self, other: Counts) -> Counts:
         return Counts(
-            self.pairs + other.pairs, self.outside_window + other.outside_window,
-            self.facing_away + other.facing_away, self.outside_beam + other.outside_beam,
-        )  # fmt: skip
+            self.pairs + other.pairs,
+            self.outside_window + other.outside_window,
+            self.facing_away + other.facing_away,
+            self.outside_beam + other.outside_beam,
+        )
 
     @property
     def contributing(self) -> int:
@@ -69,6 +72,30 @@ class Band:
 
 
 @dataclass(frozen=True, eq=False)
+class ChannelView:
+    """A channel at one receiver, as it sees scatterers.
+
+    antennas  of its pulses, and  weights  as these see the scatterers
+    frequencies  Hz, of its samples, over a band of `bandwidth`, Hz
+    polarizations  of them, with V nearest to `vertical` (3,)
+    gated     leave out scatterers outside the range window
+    """
+
+    antennas: PulseGeometry
+    weights: AntennaWeights
+    frequencies: np.ndarray
+    bandwidth: float
+    polarizations: Sequence[str]
+    vertical: np.ndarray
+    gated: bool
+
+    @property
+    def band(self) -> Band:
+        """The band of a row of its samples."""
+        return Band(len(self.frequencies), self.bandwidth, float(self.antennas.frequency.mean()))
+
+
+@dataclass(frozen=True, eq=False)
 class DeviceTiles:
     """Tiles of scatterers on a device.
 
@@ -82,10 +109,10 @@ class DeviceTiles:
     per_tile: int
     n_tiles: int
     order: np.ndarray
-    references: Any
-    radius: Any
-    offsets: Any
-    planes: Any
+    references: object
+    radius: object
+    offsets: object
+    planes: object
     n_offsets: int
     last: int
 
@@ -112,9 +139,7 @@ class HostTiling:
     """Scatterers put into tiles on the host, in Morton order. Tiles of one size stay on the device: those of the last
     plan."""
 
-    def __init__(
-        self, device: Device, positions: np.ndarray, planes: Callable[[np.ndarray], np.ndarray]
-    ) -> None:  # fmt: skip
+    def __init__(self, device: Device, positions: np.ndarray, planes: Callable[[np.ndarray], np.ndarray]) -> None:
         """positions  m (n, 3);  planes  of an order: the scatterers' numbers as the kernel reads them"""
         self.device, self.positions, self._planes = device, positions, planes
         self.bounds, self.order = box(positions), morton_order(positions)
@@ -130,18 +155,18 @@ class HostTiling:
 
     def tiles(self, per_tile: int) -> DeviceTiles:
         """Tiles of `per_tile` scatterers on the device."""
-        found = self._on_device
-        if found is None or found.per_tile != per_tile:
+        device_tiles = self._on_device
+        if device_tiles is None or device_tiles.per_tile != per_tile:
             self._on_device = None  # frees the buffers of the other size first
             largest, self._tiled_largest = self._tiled_largest, None  # what the device holds is not needed here
             tiles, order = largest if largest and largest[0].per_tile == per_tile else self._tiled(per_tile)
             upload = self.device.upload
-            found = self._on_device = DeviceTiles(
+            device_tiles = self._on_device = DeviceTiles(
                 per_tile, tiles.n_tiles, order, upload(float_pairs.wide(tiles.references.T)),
                 upload(tiles.radius.astype(np.float32)), upload(tiles.offsets), upload(self._planes(order)),
                 len(order), per_tile - (len(order) - len(self)),
             )  # fmt: skip
-        return found
+        return device_tiles
 
     def _tiled(self, per_tile: int) -> tuple[Tiles, np.ndarray]:
         return tile_points(self.positions, self.center, per_tile, self.order)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,7 +21,7 @@ from .echo_output import check_name
 Polarization = Literal["HH", "HV", "VH", "VV"]
 
 
-def polarizations(_: str, asked: Any) -> tuple[str, ...]:
+def polarizations(_: str, asked: object) -> tuple[str, ...]:
     """Names in the order of a pulse's rows; ValueError for unknown, repeated or none."""
     if isinstance(asked, str):
         asked = POLARIZATIONS if asked == "all" else (asked,)
@@ -33,7 +33,7 @@ def polarizations(_: str, asked: Any) -> tuple[str, ...]:
     return names
 
 
-def file_name(_: str, out: Any) -> Any:
+def file_name(_: str, out: object) -> object:
     """`out`, the name of a file or None; TypeError for anything else."""
     check_name(out)
     return out

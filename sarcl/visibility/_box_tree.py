@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from ..base.morton import interleaved
 from ..opencl.device import Device
 from ..opencl.launch_numbers import launch_numbers
-from ._facet_samples import SampleLines
-from ._frame import STEP, DeviceFacets, DevicePoints
+from ._frame import STEP, DeviceSamples
 
 RAY_STEP = 8  # samples that a ray decides on
 FAR = np.float32(1e30)  # coordinate of boxes that fill up a node: no line reaches them
@@ -46,23 +43,20 @@ class BoxTree:
         self.node = device.upload(np.concatenate(levels))
         self.base = device.upload(base.astype(np.int32))
 
-    def hide(
-        self, facets: DeviceFacets | DevicePoints, index: Any, n: int, lines: SampleLines, viewpoint: np.ndarray,
-        other: np.ndarray, words: Any, probe: bool,
-    ) -> None:  # fmt: skip
+    def hide(self, samples: DeviceSamples, viewpoint: np.ndarray, other: np.ndarray, probe: bool) -> None:
         """Set the bits of occluded samples: arguments as of `Occluders.hide`.
 
         probe  lines of sight from a facet's corners and centre decide where they agree: no narrow shadows are expected
         """
-        kernel = self.device.kernel("ray_casting.cl", "hidden", LINES=lines.count)
+        facets, lines, file = samples.facets, samples.lines, "ray_casting.cl"
+        kernel = self.device.kernel(file, "hidden", LINES=lines.count)
         *eye, shrink = facets.frame.eye(viewpoint)
+        step, other_eye = max(lines.step, RAY_STEP), facets.frame.eye(other)[:3]
         numbers = launch_numbers(
-            "ray_casting.cl", "hidden", step=max(lines.step, RAY_STEP), eye=eye,
-            other=facets.frame.eye(other)[:3], shrink=shrink, depth=self.depth,
-            probe=probe,
-        )  # fmt: skip
-        buffers = facets.buffer, index, facets.kind, lines.places, self.leaf, self.node, self.base, words
-        self.device.run(kernel, (n,), None, numbers, *buffers)
+            file, "hidden", step=step, eye=eye, other=other_eye, shrink=shrink, depth=self.depth, probe=probe
+        )
+        buffers = facets.buffer, samples.index, facets.kind, lines.places, self.leaf, self.node, self.base
+        self.device.run(kernel, (samples.n,), None, numbers, *buffers, samples.words)
 
 
 def _curve(points: np.ndarray) -> np.ndarray:

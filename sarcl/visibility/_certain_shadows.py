@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -17,23 +17,20 @@ FLAT = 1e-13
 
 
 def certain_shadows(
-    device: Device, receivers: Any, pair_receiver: Any, pair_occluder: Any, occluders: Any, n_pairs: int,
-    antennas: np.ndarray, margin: float = 0.0,
-) -> np.ndarray:  # fmt: skip
+    device: Device, buffers: Sequence[object], n_pairs: int, antennas: np.ndarray, margin: float = 0.0
+) -> np.ndarray:
     """UNDECIDED, MISSED or COVERED, for each pair, uint8 (n_pairs,).
 
-    receivers, pair_receiver, pair_occluder, occluders  on the device, as the kernels of lit parts read them
+    buffers   receivers, the receiver and the occluder of each pair, and occluders, as kernels of lit parts read them
     antennas  of the pulses, m (n_pulses, 1 or 2, 3), about the same origin; others stand up to `margin`, m, from these
     """
     boxes = [box_about(antennas[:, end], margin) for end in range(antennas.shape[1])]
     most = max(len(box) for box in boxes)
     eyes = np.stack([np.concatenate([box, np.repeat(box[-1:], most - len(box), axis=0)]) for box in boxes])
     state = device.empty(n_pairs)
-    device.run(
-        device.kernel(KERNELS, "certain_shadows", ENDS=len(eyes)), (n_pairs,), None,
-        launch_numbers(KERNELS, "certain_shadows", n_eyes=most),
-        receivers, pair_receiver, pair_occluder, occluders, device.upload(eyes), state,
-    )  # fmt: skip
+    kernel = device.kernel(KERNELS, "certain_shadows", ENDS=len(eyes))
+    numbers = launch_numbers(KERNELS, "certain_shadows", n_eyes=most)
+    device.run(kernel, (n_pairs,), None, numbers, *buffers, device.upload(eyes), state)
     return device.download(state, np.empty(n_pairs, np.uint8))
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -112,12 +111,11 @@ class Clipper:
         state = np.empty(len(pairs), np.uint8)
         for first in range(0, len(pairs), PAIRS_AT_ONCE):
             part = slice(first, first + PAIRS_AT_ONCE)
-            state[part] = certain_shadows(
-                self.device, *self._on_device(receivers, pairs[part]), len(pairs[part]), antennas, margin
-            )
+            buffers = self._on_device(receivers, pairs[part])
+            state[part] = certain_shadows(self.device, buffers, len(pairs[part]), antennas, margin)
         return state
 
-    def _on_device(self, receivers: Receivers, pairs: np.ndarray) -> tuple[Any, Any, Any, Any]:
+    def _on_device(self, receivers: Receivers, pairs: np.ndarray) -> Sequence[object]:
         """Receivers of pairs, receiver and occluder of each, and occluders, as the kernels read them."""
         upload, n = self.device.upload, max(len(self.occluders), len(receivers.index))
         which, index = [], []

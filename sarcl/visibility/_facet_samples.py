@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -38,8 +37,8 @@ class SampleLines:
     step  samples that one line of sight decides on, where they are looked along one by one: all 32 of a point
     """
 
-    places: Any
-    inverses: Any
+    places: object
+    inverses: object
     count: int
     step: int = 1
 

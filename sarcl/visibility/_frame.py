@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,6 +11,9 @@ from ..base.boxes import box
 from ..opencl.device import Device
 from ..scene.triangles import BLOCK, edges, normals
 from ._facet_samples import SampleLines
+
+if TYPE_CHECKING:
+    from ._ray_casting import Occluders
 
 # Height above a facet at which rays start, relative to the scene: float32 resolves 1e-7 of it. Coplanar neighbours, and
 # sheets that are modelled twice, do not occlude one another.
@@ -88,9 +91,24 @@ class DevicePoints:
         self._index = device.upload(np.arange(len(rows), dtype=np.int32))
         self._line = SampleLines.of_points(device)
 
-    def seen(self, occluders: Any, viewpoints: list[np.ndarray]) -> np.ndarray:
+    def seen(self, occluders: Occluders, viewpoints: list[np.ndarray]) -> np.ndarray:
         """Points that all viewpoints, m (3,), see past `occluders` (n,) bool."""
         words = self.device.zeros(4 * max(self.size, 1))
+        samples = DeviceSamples(self, self._index, self.size, self._line, words)
         for at, other in zip(viewpoints, viewpoints[::-1], strict=True):
-            occluders.hide(self, self._index, self.size, self._line, at, other, words)
+            occluders.hide(samples, at, other)
         return self.device.download(words, np.empty(max(self.size, 1), np.uint32))[: self.size] == 0
+
+
+@dataclass(frozen=True, eq=False)
+class DeviceSamples:
+    """Samples on lines of n facets or points, whose occlusion is noted on the device.
+
+    index  (n,) int32: of the facets;  words  uint32 (n, lines.count), a bit per sample: both buffers
+    """
+
+    facets: DeviceFacets | DevicePoints
+    index: object
+    n: int
+    lines: SampleLines
+    words: object

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from ..opencl.device import Device
 from ..opencl.launch_numbers import launch_numbers
 from ._facet_samples import FEWEST_LINES, MOST_LINES, PER_LINE, SampleLines
-from ._frame import DeviceFacets, Frame, box_of
+from ._frame import DeviceFacets, DeviceSamples, Frame, box_of
 from ._ray_casting import Occluders
 
 CHUNK = 2**16  # facets per call of the kernels: bounds the memory
@@ -63,7 +62,7 @@ class IlluminationSolver:
         self.frame = frame = Frame.around(box_of(triangles, solid, floor))
         self.facets = DeviceFacets(device, triangles, frame, np.broadcast_to(~np.asarray(two_sided), k))
         keep = np.ones(k, bool) if wanted is None else wanted
-        hiders: list[tuple[Any, np.ndarray]] = []  # each with the facets that it may hide
+        hiders: list[tuple[Occluders, np.ndarray]] = []  # each with the facets that it may hide
         for facets, hidden in ((solid, np.ones(k, bool)), (floor, over)):
             n = int((keep & hidden).sum())
             if n and len(facets):
@@ -115,12 +114,10 @@ class IlluminationSolver:
             halves.append(seen[between])
             by_rays.append(np.full(len(partly[-1]), rays))
         none = np.zeros(0, np.int64), np.zeros((0, 2), np.uint16)
-        return Look(
-            levels, np.concatenate([none[0], *partly]), np.concatenate([none[1], *halves]), most,
-            np.concatenate(by_rays),
-        )  # fmt: skip
+        facets, counts = np.concatenate([none[0], *partly]), np.concatenate([none[1], *halves])
+        return Look(levels, facets, counts, most, np.concatenate(by_rays))
 
-    def _chunks(self, some: np.ndarray | None) -> Iterator[tuple[np.ndarray, list[Any]]]:
+    def _chunks(self, some: np.ndarray | None) -> Iterator[tuple[np.ndarray, list[Occluders]]]:
         """Numbers of the facets to be looked at, of those in `some` (k,) bool alone, with what may hide them."""
         for index, hiders in self._parts:
             if some is not None:
@@ -129,27 +126,29 @@ class IlluminationSolver:
                 yield index[i : i + CHUNK], hiders
 
     def _count(
-        self, index: np.ndarray, hiders: list[Any], lines: SampleLines, viewpoints: list[np.ndarray], of: list[int],
+        self,
+        index: np.ndarray,
+        hiders: list[Occluders],
+        lines: SampleLines,
+        viewpoints: list[np.ndarray],
+        of: list[int],
         slack: float,
-    ) -> np.ndarray:  # fmt: skip
+    ) -> np.ndarray:
         """Numbers of samples of facets `index` that viewpoints number `of` see, on even and on odd lines, uint16
         (n, 2)."""
         device, n = self.device, len(index)
         if n == 0:
             return np.zeros((0, 2), np.uint16)
-        which, seen, words = (
-            device.upload(index.astype(np.int32)),
-            device.empty(4 * n),
-            device.empty(4 * lines.count * n),
-        )
+        which, seen = device.upload(index.astype(np.int32)), device.empty(4 * n)
+        samples = DeviceSamples(self.facets, which, n, lines, device.empty(4 * lines.count * n))
         face, count = (device.kernel("ray_casting.cl", name, LINES=lines.count) for name in ("face", "seen"))
         for i in of:
             numbers = launch_numbers(
                 "ray_casting.cl", "face", eye=self.frame.eye(viewpoints[i])[:3], slack=slack, fresh=i == of[0]
             )
-            device.run(face, (n,), None, numbers, self.facets.buffer, which, self.facets.kind, words)
+            device.run(face, (n,), None, numbers, self.facets.buffer, which, self.facets.kind, samples.words)
         for i in of:
             for hider in hiders:
-                hider.hide(self.facets, which, n, lines, viewpoints[i], viewpoints[-1 - i], words)
-        device.run(count, (n,), None, words, seen)
+                hider.hide(samples, viewpoints[i], viewpoints[-1 - i])
+        device.run(count, (n,), None, samples.words, seen)
         return device.download(seen, np.empty((n, 2), np.uint16))

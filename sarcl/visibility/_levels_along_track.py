@@ -41,7 +41,7 @@ class Course:
 
 def look_along(
     looks: Looks, offered: np.ndarray, first: np.ndarray, judge: Judge, accuracy: float, max_bytes: float,
-    progress: Callable[[int, int], None] | None,
+    progress: Callable[[int, int], object] | None,
 ) -> Course:  # fmt: skip
     """Levels at as many of the pulses offered (n,) as an accuracy asks for, at those of indices `first` in any case.
 

@@ -15,8 +15,7 @@ import numpy as np
 from ..base.boxes import corners as corners_of_box
 from ..opencl.device import Device
 from ..opencl.launch_numbers import launch_numbers
-from ._facet_samples import SampleLines
-from ._frame import DeviceFacets, DevicePoints, Frame
+from ._frame import DeviceSamples, Frame
 
 KERNELS = "light_buffer.cl"
 NEAREST = 1.5  # radii of the scene, from its middle: viewpoints nearer than this see it at angles too wide for a plane
@@ -28,7 +27,9 @@ MOST_ENTRIES = 2**25  # occluders in all cells; with more, cells are made larger
 class LightBuffer:
     """Facets that occlude others, as one viewpoint sees them; `Occluders` makes it."""
 
-    def __init__(self, device: Device, occluders: Any, n: int, bounds: np.ndarray, frame: Frame, viewpoint: np.ndarray):
+    def __init__(
+        self, device: Device, occluders: object, n: int, bounds: np.ndarray, frame: Frame, viewpoint: np.ndarray
+    ) -> None:
         """occluders  float32 (n, 9) on the device;  bounds  (2, 3) of these, in units of the frame"""
         self.device = device
         exact = (np.asarray(viewpoint, np.float64) - frame.center) * frame.unit
@@ -40,7 +41,7 @@ class LightBuffer:
         least, size = seen.min(axis=0), np.maximum(np.ptp(seen, axis=0), 1e-6)
         self._fixed: dict[str, Any] = dict(
             eye=frame.eye(viewpoint)[:3], across=axes[0], upward=axes[1], toward=toward, distance=distance, least=least
-        )  # fmt: skip
+        )
         self._planes = device.empty(64 * n)
         side = np.sqrt(size.prod() / (n * float(np.clip(CELLS / n, 1.0, WIDEST))))
         while True:
@@ -58,19 +59,16 @@ class LightBuffer:
         self._run("fill_cells", n, occluders, self._end, self._entries)
         self._run("shadow_planes", n, occluders, self._planes)
 
-    def hide(
-        self, facets: DeviceFacets | DevicePoints, index: Any, n: int, lines: SampleLines, other: np.ndarray, words: Any
-    ) -> None:
+    def hide(self, samples: DeviceSamples, other: np.ndarray) -> None:
         """Set the bits of occluded samples: arguments as of `Occluders.hide`."""
+        facets, lines = samples.facets, samples.lines
         kernel = self.device.kernel(KERNELS, "shaded", LINES=lines.count)
         numbers = launch_numbers(KERNELS, "view", other=facets.frame.eye(other)[:3], **self._numbers)
         items = max(lines.count // 16, 1) if self.device.info.vector_width == 1 else 1  # ITEM_LINES of the kernel
-        self.device.run(
-            kernel, (n, items), None, numbers, facets.buffer, index, lines.inverses, self._planes, self._end, self._top,
-            self._entries, words,
-        )  # fmt: skip
+        buffers = facets.buffer, samples.index, lines.inverses, self._planes, self._end, self._top, self._entries
+        self.device.run(kernel, (samples.n, items), None, numbers, *buffers, samples.words)
 
-    def _run(self, kernel: str, n: int, *buffers: Any) -> None:
+    def _run(self, kernel: str, n: int, *buffers: object) -> None:
         numbers = launch_numbers(KERNELS, "view", other=np.zeros(3), **self._numbers)
         self.device.run(self.device.kernel(KERNELS, kernel), (n,), None, numbers, *buffers)
 

@@ -19,7 +19,7 @@ from ..scene.scene import Scene
 from ..scene.triangles import centroids, normals
 from ._frame import DevicePoints, Frame
 from ._ray_casting import Occluders
-from .lit_parts import LitParts
+from .lit_parts import FacetPieces, LitParts
 
 AT_ONCE = 64  # pulses whose lit parts are computed together
 FIRST_LOOKS = 9  # pulses from which pixels are looked at first
@@ -28,9 +28,13 @@ LEFT = 1e-3  # of the pixels, which may change by more than the tolerance
 
 
 def facet_shares(
-    scene: Scene, track: Trajectory, *, receiver: Trajectory | None = None, device: DeviceChoice | None = None,
+    scene: Scene,
+    track: Trajectory,
+    *,
+    receiver: Trajectory | None = None,
+    device: DeviceChoice | None = None,
     progress: Callable[[int, int], None] | None = None,
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """Share of the area of each facet that both antennas see at each pulse, 0 to 1: float32 (n_pulses, k).
 
     Exact, as `echo` takes it: facets are clipped along the shadows' edges, and one-sided ones that face away are dark.
@@ -50,10 +54,8 @@ def facet_shares(
     opened = open_device(device)
     triangles, out = scene.triangles, np.ones((n, k), np.float32)
     places, normal, one_sided = centroids(triangles), normals(triangles), ~scene.two_sided
-    parts = LitParts(
-        opened, triangles, triangles, ends, two_sided=scene.two_sided, wanted=np.ones(k, bool),
-        max_bytes=budget(opened, None) / 4,
-    )  # fmt: skip
+    pieces = FacetPieces.uncut(triangles, scene.two_sided)
+    parts = LitParts(opened, pieces, triangles, ends, max_bytes=budget(opened, None) / 4)
     for first in range(0, n, AT_ONCE):
         some = slice(first, min(first + AT_ONCE, n))
         antennas = [end[some] for end in ends]

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from ..base.boxes import box
 from ..opencl.device import Device
 from ._box_tree import BoxTree
-from ._facet_samples import SampleLines
-from ._frame import DeviceFacets, DevicePoints, Frame
+from ._frame import DeviceSamples, Frame
 from ._light_buffer import LightBuffer, sees_from_outside
 
 FEW = 100  # occluders of each facet, from which on rays through a tree take less time than to put them into cells
@@ -26,27 +23,23 @@ class Occluders:
         self.device, self.frame, self._few = device, frame, FEW * n < len(triangles)
         self._corners = ((triangles - frame.center) * frame.unit).astype(np.float32).reshape(-1, 9)
         self._bounds = box(self._corners.reshape(-1, 3)).astype(np.float64)
-        self._uploaded: Any = None
+        self._uploaded: object = None
         self._tree: BoxTree | None = None
         self._views: list[tuple[np.ndarray, LightBuffer]] = []
 
-    def hide(
-        self, facets: DeviceFacets | DevicePoints, index: Any, n: int, lines: SampleLines, viewpoint: np.ndarray,
-        other: np.ndarray, words: Any,
-    ) -> None:  # fmt: skip
+    def hide(self, samples: DeviceSamples, viewpoint: np.ndarray, other: np.ndarray) -> None:
         """Set the bits of occluded samples.
 
-        index  (n,) int32: facets;  words  uint32 (n, lines.count), a bit per sample
         other  the other antenna, m (3,), or `viewpoint`: it decides on which side of a facet that is edge-on to the
                viewpoint its sample points lie
         """
         if not self.by_rays(viewpoint):
-            self._buffer(viewpoint).hide(facets, index, n, lines, other, words)
+            self._buffer(viewpoint).hide(samples, other)
             return
         if self._tree is None:
             self._tree = BoxTree(self.device, self._corners.reshape(-1, 3, 3))
         outside = sees_from_outside(self.frame, self._bounds, viewpoint)
-        self._tree.hide(facets, index, n, lines, viewpoint, other, words, outside)
+        self._tree.hide(samples, viewpoint, other, outside)
 
     def by_rays(self, viewpoint: np.ndarray) -> bool:
         """Whether rays through a tree tell what a viewpoint, m (3,), sees."""
@@ -54,9 +47,9 @@ class Occluders:
 
     def _buffer(self, viewpoint: np.ndarray) -> LightBuffer:
         """The light buffer of a viewpoint; the last two are kept."""
-        for at, known in self._views:
+        for at, buffer in self._views:
             if np.array_equal(at, viewpoint):
-                return known
+                return buffer
         self._views = self._views[-1:]
         if self._uploaded is None:
             self._uploaded = self.device.upload(self._corners)

@@ -17,9 +17,13 @@ MOST_ENTRIES = 2**23  # entries of boxes in the cells of a grid: with more, cell
 
 
 def candidate_pairs(
-    receivers: np.ndarray, occluders: np.ndarray, viewpoint: np.ndarray, turn: float, reach: float,
+    receivers: np.ndarray,
+    occluders: np.ndarray,
+    viewpoint: np.ndarray,
+    turn: float,
+    reach: float,
     casts: Callable[..., np.ndarray],
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """Pairs (n, 2) of indices of receivers and occluders that may meet on a line of sight, in the order of receivers.
 
     receivers, occluders  corners, m (k, 3, 3);  viewpoint  an antenna, m (3,)
@@ -111,8 +115,10 @@ def _overlapping(
     size = np.maximum(size, (most - least) / 1024)
     size = np.where(size > 0, size, 1.0)
     while True:
-        counts = [_cells(low, high, least, most, size)[1].prod(axis=1).sum()
-                  for low, high in (occluders, (receivers[0][inside], receivers[1][inside]))]  # fmt: skip
+        counts = [
+            _cells(low, high, least, most, size)[1].prod(axis=1).sum()
+            for low, high in (occluders, (receivers[0][inside], receivers[1][inside]))
+        ]
         if sum(counts) <= MOST_ENTRIES or (size >= most - least).all():
             break
         size = 1.5 * size
@@ -121,8 +127,8 @@ def _overlapping(
     in_cell, occluder = in_cell[order], occluder[order]
     cell, receiver = _entries(receivers[0][inside], receivers[1][inside], least, most, size)
     begin, end = np.searchsorted(in_cell, cell, "left"), np.searchsorted(in_cell, cell, "right")
-    held = end > begin
-    cell, receiver, begin, end = cell[held], inside[receiver[held]], begin[held], end[held]
+    is_overlap = end > begin
+    cell, receiver, begin, end = cell[is_overlap], inside[receiver[is_overlap]], begin[is_overlap], end[is_overlap]
     wide = int(np.ceil((most - least)[1] / size[1])) + 1
     total = np.concatenate([[0], np.cumsum(end - begin)])
     first = 0

@@ -107,6 +107,26 @@ class Illumination:
     _changes: list[tuple[np.ndarray, np.ndarray]] = field(repr=False)
     _look: Callable[[int], np.ndarray] = field(repr=False)
 
+    @classmethod
+    def of_nothing(cls, n_pulses: int) -> Illumination:
+        """The illumination of no facets."""
+        level, no_facet, pulse = np.zeros(0, np.uint8), np.zeros(0, bool), np.zeros(1, np.int64)
+        return cls(
+            blocks=np.array([[0, n_pulses]]),
+            viewpoints=pulse,
+            dark=no_facet,
+            full=no_facet,
+            changing=no_facet,
+            dark_facets=pulse,
+            window=(0, n_pulses),
+            sampling=0.0,
+            motion=0.0,
+            reached=0.0,
+            _usual=level,
+            _changes=[],
+            _look=lambda block: level,
+        )
+
     def __len__(self) -> int:
         return len(self.blocks)
 
@@ -155,26 +175,26 @@ class Illumination:
 
     def spans(self, weigh: Callable[[np.ndarray], np.ndarray] = lambda level: level) -> Iterator[Span]:
         """The window in spans, from viewpoint to viewpoint, in each of which weigh(levels), uint8, changes linearly."""
-        known: tuple[np.ndarray, np.ndarray] | None = None  # levels, and what they weigh
+        weighed: tuple[np.ndarray, np.ndarray] | None = None  # levels, and what they weigh
         for span in self._spans():
-            level = known[1] if known and known[0] is span.level else weigh(span.level)
+            level = weighed[1] if weighed and weighed[0] is span.level else weigh(span.level)
             later = level if span.later is span.level else weigh(span.later)
-            known = span.later, later
+            weighed = span.later, later
             part = Span(span.first, span.stop, level, later).within(*self.window)
             if part is not None:
                 yield part
 
     def _spans(self) -> Iterator[Span]:
-        n, held, start = int(self.blocks[-1, 1]), self.level(0), 0
-        at = self.viewpoints.tolist()
+        n, constant, start = int(self.blocks[-1, 1]), self.level(0), 0
+        pulses = self.viewpoints.tolist()
         for i in range(1, len(self)):
             level = self.level(i)
-            if not np.array_equal(level, held):
-                if start < at[i - 1]:  # constant up to there
-                    yield Span(start, at[i - 1], held, held)
-                yield Span(at[i - 1], at[i], held, level)
-                held, start = level, at[i]
-        yield Span(start, n, held, held)
+            if not np.array_equal(level, constant):
+                if start < pulses[i - 1]:
+                    yield Span(start, pulses[i - 1], constant, constant)
+                yield Span(pulses[i - 1], pulses[i], constant, level)
+                constant, start = level, pulses[i]
+        yield Span(start, n, constant, constant)
 
     def between(self, first: int, stop: int) -> Illumination:
         """The illumination of pulses first ... stop - 1 of the window alone."""
@@ -198,7 +218,7 @@ def lit(
     occluders: np.ndarray | None = None,
     ground: tuple[np.ndarray, np.ndarray] | None = None,
     device: DeviceChoice | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Callable[[int, int], object] | None = None,
 ) -> Illumination:
     """Shares of facets, m (k, 3, 3), that both antennas, m (n_pulses, 3), see, in blocks of pulses.
 
@@ -241,21 +261,15 @@ def lit(
     if max_bytes is None:
         max_bytes = budget(opened, None) / 4
     if k == 0:
-        nothing, none = np.zeros(0, np.uint8), np.zeros(0, bool)
-        whole, first = np.array([[0, len(tx)]]), np.zeros(1, np.int64)
-        return Illumination(
-            whole, first, none, none, none, first, (0, len(tx)), 0.0, 0.0, 0.0, nothing, [], lambda block: nothing
-        )
+        return Illumination.of_nothing(len(tx))
     solver = IlluminationSolver(
-        opened, triangles, two_sided=two_sided, wanted=wanted,
-        occluders=occluders, ground=ground,
-    )  # fmt: skip
+        opened, triangles, two_sided=two_sided, wanted=wanted, occluders=occluders, ground=ground
+    )
     power = np.asarray(areas(triangles) if weights is None else weights, np.float64)
     power = power * (1.0 if wanted is None else wanted)
     bounds = box_of(triangles) if ground is None else box_of(triangles, ground[0])
-    course, viewpoints, errors = _within(
-        accuracy, tolerance, solver, triangles, bounds, ends, power, max_bytes, progress
-    )
+    shadows = _MovingShadows.of(triangles, bounds, ends)
+    course, viewpoints, errors = _within(accuracy, tolerance, solver, shadows, power, max_bytes, progress)
     blocks = blocks_around(viewpoints, len(tx))
     n_wanted = k if wanted is None else int(np.sum(wanted))
     if not course.ever.any() and n_wanted:
@@ -270,25 +284,50 @@ def lit(
     )  # fmt: skip
 
 
+@dataclass(frozen=True, eq=False)
+class _MovingShadows:
+    """Shadows that move as antennas, `ends`, m (n_pulses, 3) each, pass all that occludes, in the box `bounds` (2, 3).
+
+    widths  rad, by which each antenna turns while shadows move by the width of a facet
+    """
+
+    ends: list[np.ndarray]
+    bounds: np.ndarray
+    widths: list[float]
+
+    @classmethod
+    def of(cls, triangles: np.ndarray, bounds: np.ndarray, ends: list[np.ndarray]) -> _MovingShadows:
+        """Shadows on facets, m (k, 3, 3), of all of them: which are wanted must not move the blocks."""
+        middle = [end[len(end) // 2] for end in ends]
+        lengths = [max(shadow_length(bounds, end), 1e-300) for end in ends]
+        widths = [projected_width(triangles, at) / length for at, length in zip(middle, lengths, strict=True)]
+        return cls(ends, bounds, widths)
+
+    def blocks(self, part: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Blocks of pulses in which shadows move by a part of a facet's width, as of `pulse_blocks`."""
+        return pulse_blocks(self.ends, self.bounds, [part * width for width in self.widths])
+
+
 def _within(
-    accuracy: float, tolerance: float, solver: IlluminationSolver, triangles: np.ndarray, bounds: np.ndarray,
-    ends: list[np.ndarray], power: np.ndarray, max_bytes: float, progress: Callable[[int, int], None] | None,
-) -> tuple[Course, np.ndarray, tuple[float, float, float]]:  # fmt: skip
+    accuracy: float,
+    tolerance: float,
+    solver: IlluminationSolver,
+    shadows: _MovingShadows,
+    power: np.ndarray,
+    max_bytes: float,
+    progress: Callable[[int, int], object] | None,
+) -> tuple[Course, np.ndarray, tuple[float, float, float]]:
     """Looks with an error of at most `accuracy`, or as many as there are; their pulses (n,); and errors: of sampling,
     of motion, and the accuracy that could have been asked for.
 
-    triangles, bounds  facets, m (k, 3, 3), and the box of all that occludes (2, 3);  power  of the facets (k,)
+    power  of the facets (k,)
     """
-    judge, lines, finer = Judge(power), 0, 1.0
+    judge, lines, finer, ends = Judge(power), 0, 1.0, shadows.ends
     n_pulses = len(ends[0])
-    # from all facets: which of them are wanted must not move the blocks
-    widths = [
-        projected_width(triangles, e[len(e) // 2]) / max(shadow_length(bounds, e), 1e-300) for e in ends
-    ]  # rad, by which an antenna turns while shadows move by the width of a facet
-    _, coarse, _ = pulse_blocks(ends, bounds, [COARSE * width for width in widths])
-    thinned = float(np.clip(len(coarse) * len(triangles) / MUCH, 1, COARSEST))
+    _, coarse, _ = shadows.blocks(COARSE)
+    thinned = float(np.clip(len(coarse) * len(power) / MUCH, 1, COARSEST))
     while True:
-        _, offered, turns = pulse_blocks(ends, bounds, [finer * tolerance * width for width in widths])
+        _, offered, turns = shadows.blocks(finer * tolerance)
         # angle by which facets may turn towards an antenna before the next viewpoint; and those that are edge-on to one
         # of two antennas send back a part of their echo (sarcl/scattering/physical_optics.py:lit_share)
         edge_on = 0.0 if len(ends) == 1 else 2 * EDGE_ON
@@ -316,10 +355,10 @@ def _within(
             lines *= 4
 
 
-def _mask(name: str, given: np.ndarray | bool, k: int) -> np.ndarray:
+def _mask(name: str, value: np.ndarray | bool, k: int) -> np.ndarray:
     """A bool for each of k facets (k,), read-only, from one or one for all."""
-    if ndim(name, given) and np.shape(given) != (k,):
-        raise ValueError(f"{name} has shape {np.shape(given)}; wanted one for each of {k} facets, ({k},)")
-    if getattr(given, "dtype", None) != np.bool_:
-        flags(name, given)
-    return np.broadcast_to(np.asarray(given, np.bool_), (k,))
+    if ndim(name, value) and np.shape(value) != (k,):
+        raise ValueError(f"{name} has shape {np.shape(value)}; wanted one for each of {k} facets, ({k},)")
+    if getattr(value, "dtype", None) != np.bool_:
+        flags(name, value)
+    return np.broadcast_to(np.asarray(value, np.bool_), (k,))

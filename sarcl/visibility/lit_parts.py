@@ -56,8 +56,30 @@ class _Block:
     pairs: np.ndarray | None
 
 
+@dataclass(frozen=True, eq=False)
+class FacetPieces:
+    """Pieces of facets, m (k, 3, 3), whose lit parts are computed.
+
+    two_sided  (k,) bool: the others are left out where they face away;  wanted  (k,) bool: the others are not computed
+    given      facets, m (m, 3, 3), of which the pieces are parts, and  of  which (k,). What antennas see of these is
+               computed first, and then of the pieces of those that are not seen whole
+    """
+
+    triangles: np.ndarray
+    two_sided: np.ndarray
+    wanted: np.ndarray
+    given: np.ndarray
+    of: np.ndarray
+
+    @classmethod
+    def uncut(cls, triangles: np.ndarray, two_sided: np.ndarray) -> FacetPieces:
+        """Facets that are not cut, all of them wanted."""
+        k = len(triangles)
+        return cls(triangles, two_sided, np.ones(k, bool), triangles, np.arange(k))
+
+
 class LitParts:
-    """Pieces of facets, m (k, 3, 3), and others that occlude them, m (n, 3, 3), from antennas along a track.
+    """Lit parts of pieces of facets, past others that occlude them, m (n, 3, 3), from antennas along a track.
 
     A device without float64 leaves this to another one on the machine; NoDeviceError where there is none.
     dark    (k,) bool: pieces of which no pulse sees anything
@@ -67,37 +89,29 @@ class LitParts:
     def __init__(
         self,
         device: Device,
-        triangles: np.ndarray,
+        pieces: FacetPieces,
         occluders: np.ndarray,
         ends: list[np.ndarray],
         *,
-        two_sided: np.ndarray,
-        wanted: np.ndarray,
         max_bytes: float,
         margin: float = 0.0,
-        given: np.ndarray | None = None,
-        of: np.ndarray | None = None,
         progress: Callable[[int, int], object] | None = None,
     ) -> None:
         """ends  positions of the transmitter, and of a receiver elsewhere, m (n_pulses, 3) each
-        two_sided  (k,) bool: the others are left out where they face away;  wanted  (k,) bool: pieces whose lit part
-        is computed;  max_bytes  on the device;  margin  m: antennas asked for later stand up to this far from `ends`
-        given  facets, m (m, 3, 3), of which the pieces are parts, and `of` which (k,): default each its own. What
-               pulses see of these is found first, and then of the pieces of those that are not seen whole
+        max_bytes  on the device;  margin  m: antennas asked for later stand up to this far from `ends`
         progress  called as progress(pulse, pulses)
         """
         self.max_bytes, self._margin, self._first = max_bytes, margin, 0
-        if given is None or of is None:
-            given, of = triangles, np.arange(len(triangles))
-        bounds = box(np.concatenate([given.reshape(-1, 3), occluders.reshape(-1, 3)]))
+        triangles, two_sided, of = pieces.triangles, pieces.two_sided, pieces.of
+        bounds = box(np.concatenate([pieces.given.reshape(-1, 3), occluders.reshape(-1, 3)]))
         self._origin = bounds.mean(axis=0)
         self._on_plane = ON_PLANE * float(np.linalg.norm(bounds[1] - bounds[0]))
-        keep = np.flatnonzero(wanted & (areas(triangles) > 0))
+        keep = np.flatnonzero(pieces.wanted & (areas(triangles) > 0))
         self._bounds, self._occluders = bounds, occluders[areas(occluders) > 0]
         self._clipper = Clipper(with_float64(device), self._occluders, self._origin, self._on_plane, max_bytes)
         self._pieces = Receivers(keep, triangles[keep], two_sided[keep])
         self._parent, first = np.unique(of[keep], return_index=True)
-        parents = Receivers(self._parent, given[self._parent], two_sided[keep][first])
+        parents = Receivers(self._parent, pieces.given[self._parent], two_sided[keep][first])
         self._child = np.searchsorted(self._parent, of[keep])  # the parent of each piece
         self._cut = len(parents.index) < len(keep)
         self._blocks: list[_Block] = []

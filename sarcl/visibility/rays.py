@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, DTypeLike
 
 from ..base.validation import array, values
 from ..base.vectors import dot, unit
@@ -128,16 +127,16 @@ class SceneRays:
         side = np.where(dot(normal, ahead) < 0, -STEP, STEP)
         return points + side[:, None] * normal, normal.any(axis=1)
 
-    def _launched(self, kernel: str, lines: np.ndarray, kind: Any, none: int) -> np.ndarray:
+    def _launched(self, kernel: str, lines: np.ndarray, kind: DTypeLike, none: int) -> np.ndarray:
         """What a kernel finds on lines in the frame, float32 (n, 6): (n,) of type `kind`; `none` where nothing is."""
         out, tree = np.full(len(lines), none, kind), self._tree
         if tree is not None and len(lines):
-            found = self.device.empty(out.nbytes)
+            buffer = self.device.empty(out.nbytes)
             self.device.run(
                 self.device.kernel(KERNELS, kernel), (len(lines),), None,
-                tree.depth, self.device.upload(lines), tree.leaf, tree.node, tree.base, found,
+                tree.depth, self.device.upload(lines), tree.leaf, tree.node, tree.base, buffer,
             )  # fmt: skip
-            self.device.download(found, out)
+            self.device.download(buffer, out)
         return out
 
     def _distance(self, facet: np.ndarray, origins: np.ndarray, ahead: np.ndarray) -> np.ndarray:

@@ -13,6 +13,7 @@ from sarcl.numerics.pulse_geometry import PulseGeometry
 from sarcl.reference import facet
 from sarcl.scattering._cutting_error import CuttingError
 from sarcl.scattering._facet_norm import longest_piece
+from sarcl.scattering.facet_kinds import FacetView
 from sarcl.scene.triangles import cut
 
 TONE = sarcl.Waveform.chirp(center=9.6e9, bandwidth=1e6, duration=1e-6)
@@ -110,7 +111,7 @@ def test_many_looks_take_the_estimate_from_small_pieces():
 def cutting_error(triangles, tx):
     ends = PulseGeometry(tx[None], tx[None])
     scene = sarcl.Scene.facets(triangles, two_sided=False)
-    return CuttingError(scene, np.ones(len(triangles), bool), ends, 9.6e9, 0.0, ("HH",), VERTICAL)
+    return CuttingError(FacetView(scene, ends, 9.6e9, 0.0, ("HH",), VERTICAL))
 
 
 @pytest.mark.parametrize("triangles", [plate(1.0), SCALENE], ids=["plate", "scalene"])

@@ -12,6 +12,7 @@ from sarcl.base.errors import ToleranceUnreachable
 from sarcl.base.vectors import unit
 from sarcl.numerics.pulse_geometry import PulseGeometry
 from sarcl.scattering._direction_error import FLOAT32_DIRECTION, DirectionError, _rotations
+from sarcl.scattering.facet_kinds import FacetView
 from sarcl.scattering.facets import FacetSet
 from sarcl.scattering.physical_optics import polarisation, scattering_matrix
 from sarcl.scene.triangles import cut
@@ -90,12 +91,16 @@ def test_a_needle_across_the_vertical_is_refused_with_what_helps():
     assert raw.report.predicted_error <= 1e-3
 
 
+def direction_error(scene, antennas):
+    return DirectionError(FacetView(scene, antennas, 9.6e9, 0.0, NAMES, UP))
+
+
 def test_h_and_v_turn_by_the_change_of_azimuth():
     """The rotation that the bound uses against the vectors themselves, for small steps of the line of sight."""
     random = np.random.default_rng(1)
     scene = sarcl.Scene.facets(plate(1.0))
     ends = PulseGeometry(np.array([[1.0, 2.0, 1e3]]), np.array([[300.0, 0.0, 1e3]]))
-    errors = DirectionError(scene, np.ones(2, bool), ends, 9.6e9, NAMES, UP)
+    errors = direction_error(scene, ends)
     end, places = np.array([20.0, 30.0, 1e3]), random.uniform(-5, 5, (200, 3))
     others = places + 1e-3 * random_units(random, 200)
     turn = _rotations(errors._turned_by(places, others, end))
@@ -110,7 +115,7 @@ def test_the_bound_is_no_less_than_what_the_corners_make_of_the_matrix(off):
     triangles = plate(0.2)[:1]
     tx, rx = np.array([off, 0.4 * off, 1e3]), np.array([-200.0, 350.0, 800.0])
     ends, scene = PulseGeometry(tx[None], rx[None]), sarcl.Scene.facets(triangles, material=WET)
-    errors = DirectionError(scene, np.ones(1, bool), ends, 9.6e9, NAMES, UP)
+    errors = direction_error(scene, ends)
     eps = WET.permittivity(9.6e9)
     middle = triangles.mean(axis=1)
     exact = scattering_matrix(UP, unit(tx - middle[0]), unit(rx - middle[0]), eps)
@@ -125,13 +130,13 @@ def test_the_bound_is_no_less_than_what_the_corners_make_of_the_matrix(off):
 
 
 def test_what_turns_alike_or_is_seen_from_the_side_costs_nothing():
-    scene, every = sarcl.Scene.facets(plate(1.0)), np.ones(2, bool)
+    scene = sarcl.Scene.facets(plate(1.0))
     above, aside = np.array([[0.2, 0.1, 1e3]]), np.array([[800.0, 0.0, 900.0]])
     for tx, rx in ((above, above), (aside, aside), (aside, 1.1 * aside)):
-        assert DirectionError(scene, every, PulseGeometry(tx, rx), 9.6e9, NAMES, UP).turn(1.0) == (0.0, False)
-    both = DirectionError(scene, every, PulseGeometry(above, aside), 9.6e9, NAMES, UP).turn(1.0)
+        assert direction_error(scene, PulseGeometry(tx, rx)).turn(1.0) == (0.0, False)
+    both = direction_error(scene, PulseGeometry(above, aside)).turn(1.0)
     assert both[0] > 0.3 and both[1]
-    assert DirectionError(scene, every, PulseGeometry(aside, above), 9.6e9, NAMES, UP).turn(1.0) == pytest.approx(both)
+    assert direction_error(scene, PulseGeometry(aside, above)).turn(1.0) == pytest.approx(both)
 
 
 @pytest.mark.parametrize("height", [0.2, 1.0, 4.0, 20.0, 100.0])
@@ -150,6 +155,6 @@ def test_the_rounding_of_grazing_facets_is_what_their_cosines_say(bistatic):
         tx, rx = np.array([[5e3, 1e3, height]]), np.array([[1e3, 4e3, 2e3]])
         ends = PulseGeometry(tx, rx if bistatic else tx)
         scene = sarcl.Scene.facets(plate(0.5), material=WET, two_sided=False)
-        found = DirectionError(scene, np.ones(2, bool), ends, 9.6e9, NAMES, UP).rounding
+        found = direction_error(scene, ends).rounding
         cosine = height / np.linalg.norm(tx)
         assert 0.5 < found * cosine / FLOAT32_DIRECTION < 3

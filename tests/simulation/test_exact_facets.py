@@ -13,6 +13,7 @@ from sarcl.scattering.antenna_weights import AntennaWeights
 from sarcl.scattering.facet_plan import FacetPlan
 from sarcl.scattering.facets import FacetSet
 from sarcl.simulation._exact_facets import ExactFacets
+from sarcl.simulation.spreading import ChannelView
 
 
 def test_sums_in_float64_are_those_of_the_reference_and_count_what_is_seen():
@@ -32,7 +33,8 @@ def test_sums_in_float64_are_those_of_the_reference_and_count_what_is_seen():
     )  # fmt: skip
     plan = FacetPlan(1.0, frequencies[:1], 1e-4, 6.0, is_float64=True)
     names, vertical = ("HH", "VV"), np.array([0.0, 0, 1])
-    spreader = ExactFacets(part, plan, antennas, frequencies, True, names, vertical, AntennaWeights(antennas, 9.6e9))
+    view = ChannelView(antennas, AntennaWeights(antennas, 9.6e9), frequencies, 0.0, names, vertical, gated=True)
+    spreader = ExactFacets(part, plan, view)
     samples = np.zeros((2, 2, 4), np.complex64)
     counts = spreader.add(samples, range(2), Clock(), lambda n: None)
     for p in range(2):

@@ -11,7 +11,7 @@ from sarcl.reference.lit_part import lit_part
 from sarcl.scene.triangles import cut, of_grid
 from sarcl.visibility._certain_shadows import COVERED, MISSED, UNDECIDED, box_about, certain_shadows
 from sarcl.visibility._clipping import SLACK, Clipper, Receivers
-from sarcl.visibility.lit_parts import LitParts
+from sarcl.visibility.lit_parts import FacetPieces, LitParts
 
 ON_PLANE = 1e-6  # m
 NO_WAVES = np.zeros(0)
@@ -35,7 +35,7 @@ def states(device, facets, occluders, antennas):
     chosen, n = with_float64(device), np.arange(len(facets))
     packed = Receivers(n, facets, np.ones(len(n), bool)).packed(n, np.zeros(3), ON_PLANE)
     index, solid = chosen.upload(n.astype(np.int32)), chosen.upload(occluders.reshape(-1, 9))
-    return certain_shadows(chosen, chosen.upload(packed), index, index, solid, len(n), antennas)
+    return certain_shadows(chosen, (chosen.upload(packed), index, index, solid), len(n), antennas)
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -114,10 +114,9 @@ def test_pieces_in_the_middle_of_a_shadow_and_beside_it_are_decided_for_all_puls
     pieces, of = cut(of_grid(2 * square), 0.1, 10**6)
     above = of_grid(square + np.array([0, 0, 1.0]))
     track = np.stack([np.linspace(-20, 20, 40), np.full(40, -4e3), np.full(40, 8e3)], axis=1)
-    parts = LitParts(
-        device, pieces, above, [track], two_sided=np.ones(len(pieces), bool), wanted=np.ones(len(pieces), bool),
-        max_bytes=1e8, given=of_grid(2 * square), of=of,
-    )  # fmt: skip
+    every = np.ones(len(pieces), bool)
+    facets = FacetPieces(pieces, every, every, of_grid(2 * square), of)
+    parts = LitParts(device, facets, above, [track], max_bytes=1e8)
     clipped, computed = [], Clipper._computed
 
     def count(clipper, receivers, which, begins, occluder, *rest):

@@ -10,7 +10,7 @@ import sarcl
 from sarcl.reference.lit_part import lit_part
 from sarcl.scene.triangles import normals
 from sarcl.visibility._shadow_pairs import candidate_pairs
-from sarcl.visibility.lit_parts import LitParts
+from sarcl.visibility.lit_parts import FacetPieces, LitParts
 
 WAVES = np.array([1.0, 30.0, 200.0, 400.0])  # rad/m
 TOLERANCE = 2e-7  # float64, stored in float32; also of devices that leave float64 to another one
@@ -18,11 +18,8 @@ FACET = np.array([[[0, 0, 0], [1, 0, 0], [0, 1, 0]]], float)
 
 
 def lit_parts(device, triangles, occluders, ends, *, two_sided=True, margin=0.0):
-    k = len(triangles)
-    return LitParts(
-        device, triangles, occluders, ends, two_sided=np.full(k, two_sided), wanted=np.ones(k, bool), max_bytes=1e8,
-        margin=margin,
-    )  # fmt: skip
+    pieces = FacetPieces.uncut(triangles, np.full(len(triangles), two_sided))
+    return LitParts(device, pieces, occluders, ends, max_bytes=1e8, margin=margin)
 
 
 def shares(device, triangles, occluders, ends, **options):
@@ -189,10 +186,8 @@ def test_pairs_beyond_the_memory_are_found_anew_with_the_same_bits(every_device)
     k = len(facets)
     found = []
     for max_bytes in (1e8, 1.0):
-        parts = LitParts(
-            every_device, facets, occluders, ends, two_sided=np.ones(k, bool), wanted=np.ones(k, bool),
-            max_bytes=max_bytes,
-        )  # fmt: skip
+        pieces = FacetPieces.uncut(facets, np.ones(k, bool))
+        parts = LitParts(every_device, pieces, occluders, ends, max_bytes=max_bytes)
         found.append([parts.partly, parts.dark, *parts.at(0, ends, WAVES)])
     assert found[0][0].any()
     for one, other in zip(*found, strict=True):

@@ -100,12 +100,12 @@ def uncut(triangles: np.ndarray, j: MeshAdjacency, kind: np.ndarray) -> tuple[np
     points, its = points[order], its[order]
     first = np.cumsum(count) - count
     fan = np.flatnonzero((its[1:-1] == its[2:]) & (its[:-2] == its[2:])) + 1 if len(its) > 2 else np.zeros(0, np.int64)
-    made = np.stack([points[first[its[fan]]], points[fan], points[fan + 1]], axis=1)
-    before, after = np.bincount(plane, j.twice, n), np.bincount(its[fan], 2 * areas(made), n)
+    fan_triangles = np.stack([points[first[its[fan]]], points[fan], points[fan + 1]], axis=1)
+    before, after = np.bincount(plane, j.twice, n), np.bincount(its[fan], 2 * areas(fan_triangles), n)
     good = np.abs(after - before) <= 1e-6 * before
-    whole = good[its[fan]] & solid(made)
+    whole = good[its[fan]] & solid(fan_triangles)
     rest = np.flatnonzero(~good[plane])
-    return np.concatenate([made[whole], triangles[rest]]), np.concatenate([stands[its[fan]][whole], rest])
+    return np.concatenate([fan_triangles[whole], triangles[rest]]), np.concatenate([stands[its[fan]][whole], rest])
 
 
 def _welded(triangles: np.ndarray) -> tuple[np.ndarray, int]:

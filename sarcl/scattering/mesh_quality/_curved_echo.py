@@ -171,9 +171,10 @@ def _roughened(
     if scene.has_random_points:
         moved = moved + (np.einsum("kij,kj->ki", scene.point_roughness[some], normal) ** 2).mean(axis=1)
     material, along, wavelength = scene.material[some], f.q * f.along, SPEED_OF_LIGHT / frequency
-    height, reflected = (np.array(values)[material] for values in (
-        [m.height for m in scene.materials], [_reflection(m, frequency) for m in scene.materials]
-    ))  # fmt: skip
+    height, reflected = (
+        np.array(values)[material]
+        for values in ([m.height for m in scene.materials], [_reflection(m, frequency) for m in scene.materials])
+    )
     kept, still = np.exp(-((along * height) ** 2)), np.exp(-(along**2) * moved)  # of the power
     power = kept * (1 - still) * flat
     for i, m in enumerate(scene.materials):

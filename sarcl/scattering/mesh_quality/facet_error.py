@@ -136,10 +136,10 @@ def _looks(scene: Scene, b: SurfaceCurvature, antennas: PulseGeometry, waveform:
         rows = np.resize(spread[: len(antennas.tx)].argsort().argsort(), LOOKS)
     for i in range(int(min(LOOKS, np.ceil(differ)))):
         frequency = waveform.center + waveform.bandwidth * ((0.5 + GOLDEN * i) % 1 - 0.5)
-        found = sums(scene, b, antennas, int(rows[i]), frequency)
+        echo = sums(scene, b, antennas, int(rows[i]), frequency)
         share = float(waveform.matched_spectrum(np.array([frequency]))[0]) ** 2
-        out.append((found, share * 4 * np.pi * (frequency / constants.SPEED_OF_LIGHT) ** 2))
-        cost += found.cost
+        out.append((echo, share * 4 * np.pi * (frequency / constants.SPEED_OF_LIGHT) ** 2))
+        cost += echo.cost
         if cost > MOST_COST:
             break
     return out

@@ -142,9 +142,13 @@ def _contrast(
     typical = float(np.median(np.maximum.reduce(edges(triangles))))
     finer = typical * float(np.sqrt(min(per_cell / ENOUGH, 1.0))) if phasors else typical
     return Speckle(
-        round(of_each * len(triangles)), per_cell, float(np.sqrt(max(2 * gaps - 1 - lack, 0.0))), gaps,
-        (cell[0], cell[1]), min(min(cell) / 2, finer),
-    )  # fmt: skip
+        round(of_each * len(triangles)),
+        per_cell,
+        float(np.sqrt(max(2 * gaps - 1 - lack, 0.0))),
+        gaps,
+        (cell[0], cell[1]),
+        min(min(cell) / 2, finer),
+    )
 
 
 def _parallelograms(places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -23,9 +24,15 @@ class ChannelRows:
     """
 
     def __init__(
-        self, array: AntennaArray, track: Trajectory, receiver: Trajectory | None, point: np.ndarray, channels: str,
-        receive: str, polarizations: Any,
-    ) -> None:  # fmt: skip
+        self,
+        array: AntennaArray,
+        track: Trajectory,
+        receiver: Trajectory | None,
+        point: np.ndarray,
+        channels: str,
+        receive: str,
+        polarizations: Sequence[str],
+    ) -> None:
         """point  the reference point, m (3,);  channels, receive: arguments of `sarcl.echo`."""
         self.array, self.point, self.receive = array, point, receive
         self.separated, self.polarizations = channels == "separated", polarizations
@@ -47,16 +54,16 @@ class ChannelRows:
         """Positions in the array of the receivers of a channel that is sent from `transmitter` (3,), m (n, 3)."""
         return transmitter[None] if self.receive == "own" else self.receivers
 
-    def tx_positions(self, elements: np.ndarray, at: Any = slice(None)) -> np.ndarray:
+    def tx_positions(self, elements: np.ndarray, at: slice | np.ndarray = slice(None)) -> np.ndarray:
         """Positions in the scene of transmitting elements, m (..., 3) in the array, at n pulses `at`: (n, ..., 3)."""
         return _in_scene(self.track.tx, self.attitudes[0], elements, at)
 
-    def rx_positions(self, elements: np.ndarray, at: Any = slice(None)) -> np.ndarray:
+    def rx_positions(self, elements: np.ndarray, at: slice | np.ndarray = slice(None)) -> np.ndarray:
         """Positions in the scene of receiving elements, m (..., 3) in the array, at n pulses `at`: (n, ..., 3)."""
         return _in_scene(self.track.rx, self.attitudes[1], elements, at)
 
     def ends(
-        self, transmitter: np.ndarray, at: Any = slice(None), which: slice = slice(None)
+        self, transmitter: np.ndarray, at: slice | np.ndarray = slice(None), which: slice = slice(None)
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Antenna positions that the rows of a channel state, at n pulses `at` and for the receivers `which`.
 
@@ -93,17 +100,23 @@ class ChannelRows:
             frequency[:] = (center + offsets - (sampling.width - 1) / 2 * sampling.step)[:, :, None]
         pulse, tx_channel, rx_channel = (i.ravel() for i in np.indices(self.shape))
         out: dict[str, Any] = {
-            "frequency": frequency.reshape(n), "tx": tx.reshape(n, 3), "rx": rx.reshape(n, 3),
-            "reference_range": reference.reshape(n), "time": None if track.times is None else track.times[pulse],
-            "tx_channel": tx_channel if self.separated else None, "rx_channel": tx_channel if own else rx_channel,
-        }  # fmt: skip
+            "frequency": frequency.reshape(n),
+            "tx": tx.reshape(n, 3),
+            "rx": rx.reshape(n, 3),
+            "reference_range": reference.reshape(n),
+            "time": None if track.times is None else track.times[pulse],
+            "tx_channel": tx_channel if self.separated else None,
+            "rx_channel": tx_channel if own else rx_channel,
+        }
         for name, velocities in (("tx_velocity", track.velocities), ("rx_velocity", back.velocities)):
             out[name] = None if velocities is None else velocities[pulse]
         every = {k: v if v is None or len(names) == 1 else np.repeat(v, len(names), axis=0) for k, v in out.items()}
         return {**every, "polarization": np.tile(names, n), "frequency_step": sampling.step}
 
 
-def _in_scene(centers: np.ndarray, attitude: np.ndarray | None, elements: np.ndarray, at: Any) -> np.ndarray:
+def _in_scene(
+    centers: np.ndarray, attitude: np.ndarray | None, elements: np.ndarray, at: slice | np.ndarray
+) -> np.ndarray:
     spread = centers[at].reshape(-1, *(1,) * (elements.ndim - 1), 3)
     turned = elements if attitude is None else np.einsum("nij,...j->n...i", attitude[at], elements)
     return np.asarray(spread + turned)

@@ -86,11 +86,11 @@ class ResponseSamples:
 
     def _response(self, side: int, to_scene: ToScene, elements: np.ndarray, at: np.ndarray) -> np.ndarray:
         ends = to_scene(elements, at)
-        made = np.exp(-2j * np.pi * self._cycles(ends, self.off))
+        phases = np.exp(-2j * np.pi * self._cycles(ends, self.off))
         if self.weights.is_needed:
             for i, pulse in enumerate(at.tolist()):
-                made[i] *= self._gain(side, ends[i], pulse)
-        return np.asarray(np.moveaxis(made, 1, 0).reshape(len(elements), -1))
+                phases[i] *= self._gain(side, ends[i], pulse)
+        return np.asarray(np.moveaxis(phases, 1, 0).reshape(len(elements), -1))
 
     def _gain(self, side: int, ends: np.ndarray, pulse: int) -> np.ndarray:
         """Weights (m, k) of one antenna at positions `ends`, m (m, 3), towards the points; side  0: tx, 1: rx."""

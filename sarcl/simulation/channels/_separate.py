@@ -52,9 +52,13 @@ class ChannelLayout:
         return Band(n, n * step, float(frequencies[0]) + n // 2 * step)
 
     def geometry(
-        self, tx: np.ndarray, rx: np.ndarray, reference_range: np.ndarray, frequencies: np.ndarray,
+        self,
+        tx: np.ndarray,
+        rx: np.ndarray,
+        reference_range: np.ndarray,
+        frequencies: np.ndarray,
         window: tuple[float, float] | None = None,
-    ) -> PulseGeometry:  # fmt: skip
+    ) -> PulseGeometry:
         """Geometry of echoes between tx and rx, m (n, 3), at frequencies, Hz; window  (near, far), default `window`."""
         near, far = self.window if window is None else window
         return PulseGeometry.sampled(

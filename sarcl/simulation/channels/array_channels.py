@@ -139,6 +139,6 @@ class ArrayChannels:
                 values, powers = exact(prepared, geometry, pulse, f, prepared.weights.at(geometry))
                 wanted[:, inside] += values * factor
                 power[:, inside] += powers * np.abs(factor) ** 2
-            made = samples[pulse][transmitter, receiver][:, some]
-            sums += [np.sum(np.abs(made - wanted) ** 2), np.sum(np.abs(wanted) ** 2), power.sum()]
+            row_samples = samples[pulse][transmitter, receiver][:, some]
+            sums += [np.sum(np.abs(row_samples - wanted) ** 2), np.sum(np.abs(wanted) ** 2), power.sum()]
         return float(np.sqrt(sums[0] / max(sums[1], sums[2]))) if sums[0] else 0.0

@@ -67,9 +67,13 @@ class AmplitudeSamples:
     """Random scatterers, and pairs of scatterer and pulse at which expansions are compared with the amplitudes."""
 
     def __init__(
-        self, amplitudes: Amplitudes, size: np.ndarray, band: tuple[float, float],
-        seen: Callable[[np.ndarray, np.random.Generator], np.ndarray], kinds: np.ndarray | None = None,
-    ) -> None:  # fmt: skip
+        self,
+        amplitudes: Amplitudes,
+        size: np.ndarray,
+        band: tuple[float, float],
+        seen: Callable[[np.ndarray, np.random.Generator], np.ndarray],
+        kinds: np.ndarray | None = None,
+    ) -> None:
         """size  (n,) of the scatterers, such as areas: large ones are drawn more often;  band  Hz, its limits
         seen    (scatterers (n,), random) -> sines (n,) at which random pulses of the track see them
         kinds   int (n,), of scatterers whose errors are judged apart: the pieces of a specular facet add up in phase,
@@ -129,17 +133,20 @@ def expand(samples: AmplitudeSamples, sines: tuple[float, float], tolerance: flo
         rows = _pivots(matrix[:, picked].conj().T, rank)
         inverse = np.linalg.pinv(made.reshape(-1, len(columns))[np.ix_(rows, picked)], rcond=1e-10)
         sine_j, frequency_j = (np.array([columns[i][axis] for i in picked]) for axis in (0, 1))
-        found = AspectExpansion(amplitudes, sine_j, frequency_j, some[rows // n_pol], rows % n_pol, inverse, 0.0)
-        error = samples.error(found)
+        expansion = AspectExpansion(amplitudes, sine_j, frequency_j, some[rows // n_pol], rows % n_pol, inverse, 0.0)
+        error = samples.error(expansion)
         best = min(best, error)
         if error <= tolerance:
-            return replace(found, error=error)
+            return replace(expansion, error=error)
         if rank == len(order):
             break
     raise ToleranceUnreachable(
-        asked, None, "amplitudes that change along the track", "use echo, which computes them pulse by pulse",
+        asked,
+        None,
+        "amplitudes that change along the track",
+        "use echo, which computes them pulse by pulse",
         how=f"by spectral_echo: {len(order)} functions of aspect leave {best:.1e} of these scatterers' amplitudes",
-    )  # fmt: skip
+    )
 
 
 def one_function(samples: AmplitudeSamples, sine: float) -> AspectExpansion:

@@ -196,42 +196,49 @@ def plan_transfer(
     for tried in TRIED:
         time.spend(compared_samples(some, n_functions, n_lags), n_lags)
         time.spend(table_samples(aspects, n_functions, *tried), n_lags)
-        made = transfer_tables(aspects, functions, *tried)
-        error = response_error(made, functions, factors[:TESTED], track, reach)
-        error = max(error, *(_seen_error(made, functions, group, track, reach) for group in groups), 0.0)
+        transfer = transfer_tables(aspects, functions, *tried)
+        error = response_error(transfer, functions, factors[:TESTED], track, reach)
+        error = max(error, *(_seen_error(transfer, functions, group, track, reach) for group in groups), 0.0)
         error *= SAFETY
         best = min(best, error)
         if error <= tolerance:
-            return replace(made, error=error)
+            return replace(transfer, error=error)
     raise ToleranceUnreachable(
-        asked, None, "transform along the track of beams with edges", "use echo",
+        asked,
+        None,
+        "transform along the track of beams with edges",
+        "use echo",
         f"by spectral_echo: transfer functions leave {best:.1e} of the responses along the track",
-    )  # fmt: skip
+    )
 
 
 def response_error(
-    made: AzimuthTransfer, functions: Functions, factors: np.ndarray, track: StraightTrack, reach: tuple[float, float]
+    transfer: AzimuthTransfer,
+    functions: Functions,
+    factors: np.ndarray,
+    track: StraightTrack,
+    reach: tuple[float, float],
 ) -> float:
     """Largest relative error of responses along the track made from tables, over stretches as long as the track.
 
     Where the track sees little of the responses at one range, their error counts relative to the mean of all ranges.
     """
-    aspects, worst = made.aspects, 0.0
+    aspects, worst = transfer.aspects, 0.0
     low, high = aspects.band
     ranges = sorted({aspects.nearest, aspects.farthest, 0.6 * aspects.nearest + 0.4 * aspects.farthest})
     for f in {low, high, 0.4 * low + 0.6 * high}:
-        power = np.array([_power_and_error(made, functions, factors, track, reach, r, f) for r in ranges])
+        power = np.array([_power_and_error(transfer, functions, factors, track, reach, r, f) for r in ranges])
         right = np.maximum(power[:, 0], power[:, 0].mean())
         worst = max(worst, float(np.sqrt((power[:, 1] / right).max())) if right.any() else 0.0)
     return worst
 
 
 def _power_and_error(
-    made: AzimuthTransfer, functions: Functions, factors: np.ndarray, track: StraightTrack,
+    transfer: AzimuthTransfer, functions: Functions, factors: np.ndarray, track: StraightTrack,
     reach: tuple[float, float], r: float, f: float,
 ) -> tuple[float, float]:  # fmt: skip
     """Power of the responses at slant range r, m, and frequency f, Hz, and of their error."""
-    aspects, grid = made.aspects, doppler_grid(made, track, reach)
+    aspects, grid = transfer.aspects, doppler_grid(transfer, track, reach)
     # a period away the response is 0 at all lags at which scatterers of this range are seen
     begin, end = (r * float(tangent(sine)) for sine in aspects.support)
     low_seen, high_seen = (r * float(tangent(sine)) for sine in aspects.seen)
@@ -240,45 +247,53 @@ def _power_and_error(
     n = min(int((last - first) / track.spacing), grid.n_lags)
     if n < 1:
         return 0.0, 0.0
-    response, exact = _responses(made, functions, factors, track, grid, r, f, first, n)
+    lag = first + np.arange(n) * track.spacing
+    response, exact = _responses(transfer, functions, factors, grid, r, f, lag)
     span = min(n, track.n_pulses)
     return _largest_sum(np.abs(exact) ** 2, span), _largest_sum(np.abs(response - exact) ** 2, span)
 
 
 def _seen_error(
-    made: AzimuthTransfer, functions: Functions, seen: SeenScatterers, track: StraightTrack, reach: tuple[float, float]
+    transfer: AzimuthTransfer,
+    functions: Functions,
+    seen: SeenScatterers,
+    track: StraightTrack,
+    reach: tuple[float, float],
 ) -> float:
     """Relative error of the samples of some scatterers, at all pulses.
 
     A short track may see them far below what stretches elsewhere along the track would.
     """
-    grid, wrong, right = doppler_grid(made, track, reach), 0.0, 0.0
+    grid, wrong, right = doppler_grid(transfer, track, reach), 0.0, 0.0
     n = min(track.n_pulses, grid.n_lags)
-    for f in made.aspects.band:
+    for f in transfer.aspects.band:
         for i, r in enumerate(seen.slant_range.tolist()):
-            response, exact = _responses(
-                made, functions, seen.factors[[i]], track, grid, r, f, -float(seen.azimuth[i]), n
-            )
+            lag = -float(seen.azimuth[i]) + np.arange(n) * track.spacing
+            response, exact = _responses(transfer, functions, seen.factors[[i]], grid, r, f, lag)
             wrong += float((np.abs(response - exact) ** 2).sum())
             right += float((np.abs(exact) ** 2).sum())
     return float(np.sqrt(wrong / right)) if right else 0.0
 
 
 def _responses(
-    made: AzimuthTransfer, functions: Functions, factors: np.ndarray, track: StraightTrack, grid: DopplerGrid, r: float,
-    f: float, first: float, n: int,
-) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
-    """Responses (n_factors, n) at lags first + i spacing, m, by the tables and by the formula."""
+    transfer: AzimuthTransfer,
+    functions: Functions,
+    factors: np.ndarray,
+    grid: DopplerGrid,
+    r: float,
+    f: float,
+    lag: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Responses (n_factors, n) at evenly spaced lags, m (n,), by the tables and by the formula."""
     u, k = grid.wavenumbers, float(wavenumber(f))
-    lag = first + np.arange(n) * track.spacing
-    turn = made.phase.at_middle(u, k) - (made.phase.kappa(u, k) - 2 * k) * (r - made.aspects.middle_range)
-    known = np.exp(1j * (turn + u * first)) / grid.period
-    shares = made.range_weights(np.array([r]))[:, 0]
-    tables = [[made.amplitude(j, q, f, u) for q in range(len(shares))] for j in range(len(made.tables))]
+    turn = transfer.phase.at_middle(u, k) - (transfer.phase.kappa(u, k) - 2 * k) * (r - transfer.aspects.middle_range)
+    known = np.exp(1j * (turn + u * lag[0])) / grid.period
+    shares = transfer.range_weights(np.array([r]))[:, 0]
+    tables = [[transfer.amplitude(j, q, f, u) for q in range(len(shares))] for j in range(len(transfer.tables))]
     spectra = (factors @ np.einsum("q,jqu->ju", shares, np.array(tables))) * known
-    response = fft.rows(None, grid.folded(spectra), inverse=True)[:, :n]
+    response = fft.rows(None, grid.folded(spectra), inverse=True)[:, : len(lag)]
     distance = np.hypot(r, lag)
-    wave = np.exp(-2j * k * lag**2 / (distance + r)) * made.aspects.window(lag / distance)
+    wave = np.exp(-2j * k * lag**2 / (distance + r)) * transfer.aspects.window(lag / distance)
     return response, (factors @ functions(lag / distance, f)) * wave
 
 

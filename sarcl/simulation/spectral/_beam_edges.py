@@ -68,10 +68,13 @@ def _continued(antenna: Antenna, soft: float, is_two_way: bool) -> Antenna:
     spline = make_interp_spline(np.arange(len(azimuth)), antenna.values, k=3)
     values = spline(np.arange(-1, len(azimuth) + 1))
     return Antenna.table(
-        azimuth[0] + step * np.arange(-1, len(azimuth) + 1), antenna.elevation, values,
-        gain_db=antenna.gain_db + 20 * float(np.log10(np.abs(values).max())), two_way=antenna.two_way,
+        azimuth[0] + step * np.arange(-1, len(azimuth) + 1),
+        antenna.elevation,
+        values,
+        gain_db=antenna.gain_db + 20 * float(np.log10(np.abs(values).max())),
+        two_way=antenna.two_way,
         mount=antenna.mount,
-    )  # fmt: skip
+    )
 
 
 def beam_edges(

@@ -34,9 +34,13 @@ class BeamExtent:
 
 
 def beam_extent(
-    amplitudes: ScattererAmplitudes, first: np.ndarray, last: np.ndarray, band: tuple[float, float], allowed: float,
+    amplitudes: ScattererAmplitudes,
+    first: np.ndarray,
+    last: np.ndarray,
+    band: tuple[float, float],
+    allowed: float,
     among: np.ndarray | None = None,
-) -> BeamExtent:  # fmt: skip
+) -> BeamExtent:
     """The extent of a beam that leaves out an error of `allowed` at most, relative to all echoes at random phases.
 
     first, last  sines between which the track sees each scatterer (n,);  band  Hz, its limits
@@ -82,9 +86,13 @@ class _Energy:
     """Energy of scatterers over aspect: of the pulses between two sines of each."""
 
     def __init__(
-        self, amplitudes: ScattererAmplitudes, first: np.ndarray, last: np.ndarray, band: tuple[float, float],
+        self,
+        amplitudes: ScattererAmplitudes,
+        first: np.ndarray,
+        last: np.ndarray,
+        band: tuple[float, float],
         among: np.ndarray | None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.amplitudes, self.band, self.among = amplitudes, band, among
         size = amplitudes.size if among is None else amplitudes.size[among]
         size = size if size.any() else np.ones(len(first))

@@ -102,18 +102,32 @@ def edge_places(
     return EdgePlaces(side, picked, pulse[here], lag / distance, distance, longest)
 
 
-def edge_response(
-    aspects: Aspects, functions: Functions, places: EdgePlaces, spacing: float, sine: float, distance: float,
-    frequency: float,
-) -> np.ndarray:  # fmt: skip
+@dataclass(frozen=True, eq=False)
+class EdgeTask:
+    """Maps of the edges of one part of a scene, and how exact their tables have to be.
+
+    functions, factors  amplitudes of scatterers: J functions of the aspect, and factors of some of them (n, J)
+    tolerance  of the tables;  total_tolerance  that of the caller, for messages;  time  that the plans may take
+    """
+
+    aspects: Aspects
+    functions: Functions
+    factors: np.ndarray
+    track: StraightTrack
+    tolerance: float
+    total_tolerance: float
+    time: PlanningTime
+
+
+def edge_response(task: EdgeTask, places: EdgePlaces, sine: float, distance: float, frequency: float) -> np.ndarray:
     """D for one place and frequency, for every function: complex128 (J, length)."""
-    x = places.side * spacing * np.arange(places.length)
+    aspects, x = task.aspects, places.side * task.track.spacing * np.arange(places.length)
     away = np.sqrt(distance**2 + 2 * sine * distance * x + x**2)
     s = (sine * distance + x) / away
     rest = np.where(places.side * (s - (aspects.low + aspects.high) / 2) < 0, 1 - aspects.window(s), 0.0)
     further = x * (2 * sine * distance + x) / (away + distance)
     wave = rest * np.exp(-2j * float(wavenumber(frequency)) * further)
-    return functions(s, frequency) * wave
+    return task.functions(s, frequency) * wave
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,11 +146,10 @@ class EdgeNodes:
 
 
 def edge_tables(
-    aspects: Aspects, functions: Functions, places: EdgePlaces, spacing: float, middle_range: float,
-    tried: tuple[int, int, int, int], tolerance: float,
-) -> tuple[AzimuthTransfer, EdgeNodes]:  # fmt: skip
-    """Tables of the transform of D, and their nodes."""
-    n_sines, n_inverses, n_frequencies, cells = tried
+    task: EdgeTask, places: EdgePlaces, middle_range: float, size: tuple[int, int, int, int]
+) -> tuple[AzimuthTransfer, EdgeNodes]:
+    """Tables of the transform of D, of one of the sizes TRIED, and their nodes."""
+    aspects, spacing, (n_sines, n_inverses, n_frequencies, cells) = task.aspects, task.track.spacing, size
     low, high = float(places.sine.min()), float(places.sine.max())
     nearest, farthest = float(1 / places.distance.max()), float(1 / places.distance.min())
     sines = chebyshev((low + high) / 2, max(high - low, 1e-12), n_sines)
@@ -151,20 +164,20 @@ def edge_tables(
     for s in sines.tolist():
         for inverse in inverses.tolist():
             for f in frequencies.tolist():
-                made = edge_response(aspects, functions, places, spacing, s, 1 / inverse, f)
-                padded = np.zeros((len(made), n), np.complex128)
-                padded[:, delays] = spacing * made * np.exp(2j * float(wavenumber(f)) * center * x)
+                response = edge_response(task, places, s, 1 / inverse, f)
+                padded = np.zeros((len(response), n), np.complex128)
+                padded[:, delays] = spacing * response * np.exp(2j * float(wavenumber(f)) * center * x)
                 tables.append(fft.rows(None, padded))
-    whole = np.stack(tables).reshape(n_sines * n_inverses, n_frequencies, -1, n)
-    whole = whole[..., (np.arange(n + 5) - 2 - half) % n]
-    flat = whole.reshape(len(whole), -1)
+    spectra = np.stack(tables).reshape(n_sines * n_inverses, n_frequencies, -1, n)
+    spectra = spectra[..., (np.arange(n + 5) - 2 - half) % n]
+    flat = spectra.reshape(len(spectra), -1)
     power, vectors = np.linalg.eigh(flat @ flat.conj().T)
-    left = np.cumsum(np.maximum(power, 0))  # power is in rising order
-    kept = vectors[:, left > (COMPRESSED * tolerance) ** 2 * left[-1]]
-    fewer = (kept.conj().T @ flat).reshape(-1, *whole.shape[1:]).transpose(2, 0, 1, 3)
+    total = np.cumsum(np.maximum(power, 0))  # power is in rising order
+    combined = vectors[:, total > (COMPRESSED * task.tolerance) ** 2 * total[-1]]
+    fewer = (combined.conj().T @ flat).reshape(-1, *spectra.shape[1:]).transpose(2, 0, 1, 3)
     phase = EdgePhase(middle_range, center, spacing, places.side * middle * spacing)
     transfer = AzimuthTransfer(aspects, phase, 1 / inverses, frequencies, -np.pi / spacing - 2 * step, step, fewer)
-    return transfer, EdgeNodes(center, sines, inverses, kept)
+    return transfer, EdgeNodes(center, sines, inverses, combined)
 
 
 def edge_wavenumbers(
@@ -180,36 +193,26 @@ def edge_wavenumbers(
     return grid, RangeWavenumbers(phase, 2 * np.pi * center / period, float(k.sum()), 0.0, (-half, half))
 
 
-def plan_edge(
-    aspects: Aspects, functions: Functions, factors: np.ndarray, places: EdgePlaces, middle_range: float,
-    track: StraightTrack, tolerance: float, asked: float, time: PlanningTime,
-) -> tuple[AzimuthTransfer, EdgeNodes]:  # fmt: skip
-    """The smallest tables whose responses differ from D by at most `tolerance`.
-
-    factors  of some scatterers (n, J);  asked  the whole tolerance, for the message;  time  that the plan may take
-    """
+def plan_edge(task: EdgeTask, places: EdgePlaces, middle_range: float) -> tuple[AzimuthTransfer, EdgeNodes]:
+    """The smallest tables whose responses differ from D by at most the tolerance."""
     best = np.inf
-    for tried in TRIED:
-        *nodes_over, cells = tried
-        n_lags = track.n_pulses + places.length
-        tables = float(np.prod(nodes_over)) * factors.shape[1] * 2 * cells * places.length
-        time.spend(tables + COMPARED * len(factors) * n_lags, n_lags)
-        transfer, nodes = edge_tables(aspects, functions, places, track.spacing, middle_range, tried, tolerance)
-        error = SAFETY * edge_error(transfer, nodes, functions, factors, places, track)
+    for size in TRIED:
+        *nodes_over, cells = size
+        n_lags = task.track.n_pulses + places.length
+        tables = float(np.prod(nodes_over)) * task.factors.shape[1] * 2 * cells * places.length
+        task.time.spend(tables + COMPARED * len(task.factors) * n_lags, n_lags)
+        transfer, nodes = edge_tables(task, places, middle_range, size)
+        error = SAFETY * edge_error(task, transfer, nodes, places)
         best = min(best, error)
-        if error <= tolerance:
+        if error <= task.tolerance:
             return replace(transfer, error=error), nodes
-    raise ToleranceUnreachable(
-        asked, None, "hard edges of the beam", "use echo",
-        how=f"by spectral_echo: tables of the beam's hard edges leave {best:.1e} of the responses beside them",
-    )  # fmt: skip
+    how = f"by spectral_echo: tables of the beam's hard edges leave {best:.1e} of the responses beside them"
+    raise ToleranceUnreachable(task.total_tolerance, None, "hard edges of the beam", "use echo", how=how)
 
 
-def edge_error(
-    transfer: AzimuthTransfer, nodes: EdgeNodes, functions: Functions, factors: np.ndarray, places: EdgePlaces,
-    track: StraightTrack,
-) -> float:  # fmt: skip
+def edge_error(task: EdgeTask, transfer: AzimuthTransfer, nodes: EdgeNodes, places: EdgePlaces) -> float:
     """Largest relative error of responses made from tables, at places with extreme sines and distances and others."""
+    track, factors = task.track, task.factors
     grid, _ = edge_wavenumbers(transfer, nodes, places.length, track)
     extreme = [at(values) for values in (places.sine, places.distance) for at in (np.argmin, np.argmax)]
     some = np.unique([*extreme, *np.linspace(0, len(places.sine) - 1, 5).astype(int)])
@@ -222,10 +225,8 @@ def edge_error(
         for i, place in enumerate(some.tolist()):
             spectra = (factors @ np.einsum("q,jqu->ju", shares[:, i], np.array(tables))) * known
             response = fft.rows(None, grid.folded(spectra), inverse=True)[:, order]
-            exact = factors @ edge_response(
-                transfer.aspects, functions, places, track.spacing, float(places.sine[place]),
-                float(places.distance[place]), f,
-            )  # fmt: skip
+            sine, distance = float(places.sine[place]), float(places.distance[place])
+            exact = factors @ edge_response(task, places, sine, distance, f)
             right = float(np.linalg.norm(exact))
             worst = max(worst, float(np.linalg.norm(response - exact)) / right if right else 0.0)
     return worst
@@ -233,32 +234,33 @@ def edge_error(
 
 def places_of_edges(amplitudes: ScattererAmplitudes, aspects: Aspects, track: StraightTrack) -> list[EdgePlaces]:
     """Where scatterers pass the hard edges of the beam that the track sees."""
-    found, edges = [], amplitudes.edges
+    places_by_edge, edges = [], amplitudes.edges
     if edges is not None:
         ends = ((edges.first, 1, aspects.low), (edges.last, -1, aspects.high))
         for (tangents, side, inner), hard in zip(ends, aspects.hard, strict=True):
             if hard:
                 inside = np.where(edges.seen, tangents, np.inf)
-                found.append(edge_places(inside, amplitudes.azimuth, amplitudes.slant_range, side, inner, track))
-    return [places for places in found if places is not None]
+                places = edge_places(inside, amplitudes.azimuth, amplitudes.slant_range, side, inner, track)
+                places_by_edge += [] if places is None else [places]
+    return places_by_edge
 
 
 def edge_map(
-    aspects: Aspects, functions: Functions, factors: np.ndarray, places: EdgePlaces, track: StraightTrack,
-    some: np.ndarray, tolerance: float, of_grid: float, is_random: bool, tile: int, asked: float, time: PlanningTime,
-) -> MapPart:  # fmt: skip
+    task: EdgeTask, places: EdgePlaces, some: np.ndarray, grid_tolerance: float, is_random: bool, tile: int
+) -> MapPart:
     """The map of an edge.
 
-    some  indices of the part's scatterers;  tolerance, of_grid  of the tables, and of the map's grid
+    some  indices of the part's scatterers;  grid_tolerance  of the map's grid
     """
     ranges = float(places.distance.min()), float(places.distance.max() * (1 + 1e-4))
-    middle = (ranges[0] + ranges[1]) / 2
-    transfer, nodes = plan_edge(aspects, functions, factors, places, middle, track, tolerance, asked, time)
-    grid, numbers = edge_wavenumbers(transfer, nodes, places.length, track)
-    azimuth = places.pulse * track.spacing
+    transfer, nodes = plan_edge(task, places, (ranges[0] + ranges[1]) / 2)
+    grid, numbers = edge_wavenumbers(transfer, nodes, places.length, task.track)
+    azimuth = places.pulse * task.track.spacing
     per_cell = 0.0 if is_random else scatterers_per_cell(azimuth, places.distance, grid, numbers)
-    made = plan_map(of_grid, numbers, grid, ranges, per_cell, tile, asked)
-    return MapPart(
-        np.searchsorted(some, places.picked), azimuth, places.distance,
-        lambda: nodes.shares(places.sine, places.distance), transfer, grid, numbers, made,
-    )  # fmt: skip
+    plan = plan_map(grid_tolerance, numbers, grid, ranges, per_cell, tile, task.total_tolerance)
+
+    def shares() -> np.ndarray:
+        return nodes.shares(places.sine, places.distance)
+
+    index = np.searchsorted(some, places.picked)
+    return MapPart(index, azimuth, places.distance, shares, transfer, grid, numbers, plan)

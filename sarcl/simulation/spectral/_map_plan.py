@@ -106,9 +106,8 @@ def plan_map(
             return MapPlan(kernel, tile, columns, rows, n_range, spacing, origin, error)
     reach = rounded_up(best * asked / tolerance)
     raise ToleranceUnreachable(
-        asked, askable(reach), "float32 grids of the reflectivity map", "echo goes further",
-        how="by spectral_echo",
-    )  # fmt: skip
+        asked, askable(reach), "float32 grids of the reflectivity map", "echo goes further", how="by spectral_echo"
+    )
 
 
 def tile_of(device: Device) -> int:

@@ -166,5 +166,5 @@ def _flat(kernel: Interpolator) -> np.ndarray:
     wanted = 1 / kernel.transform(nu)
     powers = nu[:, None] ** (2 * np.arange(FLAT))
     scale = np.abs(powers).max(axis=0)
-    found = np.linalg.lstsq(powers / scale / wanted[:, None], np.ones(len(nu)), rcond=None)[0]
-    return np.asarray(found / scale, np.float32)
+    solution = np.linalg.lstsq(powers / scale / wanted[:, None], np.ones(len(nu)), rcond=None)[0]
+    return np.asarray(solution / scale, np.float32)

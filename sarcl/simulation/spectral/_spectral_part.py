@@ -28,7 +28,7 @@ from ._azimuth_transfer import (
     plan_transfer,
     response_error,
 )
-from ._edge_map import EdgePlaces, edge_map, places_of_edges
+from ._edge_map import EdgePlaces, EdgeTask, edge_map, places_of_edges
 from ._facet_factors import FacetFactors
 from ._map_part import MapPart
 from ._map_plan import plan_map, range_wavenumbers, scatterers_per_cell, tile_of
@@ -184,16 +184,11 @@ def plan_part(task: PartTask) -> SpectralPart:
     numbers = range_wavenumbers(transfer, grid)
     tile, x, r = tile_of(task.device), azimuth[reach.reached], ranges[reach.reached]
     per_cell = 0.0 if task.is_random else scatterers_per_cell(x, r, grid, numbers)
-    made = plan_map(of_grid, numbers, grid, (nearest, farthest), per_cell, tile, task.asked)
+    plan = plan_map(of_grid, numbers, grid, (nearest, farthest), per_cell, tile, task.asked)
     whole = np.flatnonzero(reach.reached[reach.some]) if reach.edges else slice(None)
-    maps = [MapPart(whole, x, r, lambda: transfer.range_weights(r), transfer, grid, numbers, made)]
-    for places in reach.edges:
-        maps.append(
-            edge_map(
-                seen_aspects, expansion.functions, factors[:TESTED], places, track, reach.some, of_transfer, of_grid,
-                task.is_random, tile, task.asked, task.time,
-            )
-        )  # fmt: skip
+    maps = [MapPart(whole, x, r, lambda: transfer.range_weights(r), transfer, grid, numbers, plan)]
+    edge_task = EdgeTask(seen_aspects, expansion.functions, factors[:TESTED], track, of_transfer, task.asked, task.time)
+    maps += [edge_map(edge_task, places, reach.some, of_grid, task.is_random, tile) for places in reach.edges]
     return SpectralPart(amplitudes, reach.some, expansion, tuple(maps), (low, high), outside)
 
 
@@ -262,14 +257,17 @@ def _transfer(
 
 
 def _brightest(
-    amplitudes: ScattererAmplitudes, track: StraightTrack, drawn: np.ndarray, factors: np.ndarray,
+    amplitudes: ScattererAmplitudes,
+    track: StraightTrack,
+    drawn: np.ndarray,
+    factors: np.ndarray,
     band: tuple[float, float],
-) -> SeenScatterers:  # fmt: skip
+) -> SeenScatterers:
     """Those of some scatterers (n,), with factors (n, J), that the middle or an end of the track sees brightest."""
     power = np.zeros(len(drawn))
     for place in (0.0, track.length / 2, track.length):
-        made = amplitudes(drawn, amplitudes.sines(place, drawn), sum(band) / 2)
-        power = np.maximum(power, (np.abs(made) ** 2).sum(axis=1))
+        amplitude = amplitudes(drawn, amplitudes.sines(place, drawn), sum(band) / 2)
+        power = np.maximum(power, (np.abs(amplitude) ** 2).sum(axis=1))
     best = np.argsort(-power, kind="stable")[:TESTED]
     return SeenScatterers(factors[best], amplitudes.azimuth[drawn[best]], amplitudes.slant_range[drawn[best]])
 
@@ -280,7 +278,10 @@ def _check_saras(of_amplitudes: float, of_transfer: float, outside: float, allow
     if not error <= allowed:
         best = rounded_up(1.05 * asked * error / allowed)
         raise ToleranceUnreachable(
-            asked, askable(best), "SARAS's transfer function", "take variant='exact', or echo",
+            asked,
+            askable(best),
+            "SARAS's transfer function",
+            "take variant='exact', or echo",
             "by variant='saras': stationary phase, parabolas and the grid deformation differ from the responses along "
             f"the track by {of_transfer:.1e}, amplitudes of one aspect by {of_amplitudes:.1e}",
-        )  # fmt: skip
+        )

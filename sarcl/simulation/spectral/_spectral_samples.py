@@ -32,7 +32,7 @@ class SpectralSamples:
     def compute(self, output: EchoOutput) -> None:
         """Write the samples of all pulses to an output."""
         request, n_polarizations = self.request, len(self.request.polarizations)
-        held = [part.on_device(request.device, request.budget) for part in self.parts]
+        device_parts = [part.on_device(request.device, request.budget) for part in self.parts]
         request.clock.lap("map")
         maps = [one for part in self.parts for one in part.maps]
         room = request.budget / 6 / (max(len(maps), 1) * n_polarizations)
@@ -43,10 +43,10 @@ class SpectralSamples:
             ]
             for part in self.parts
         ]
-        for i, (part, on_device, out) in enumerate(zip(self.parts, held, spectra, strict=True)):
+        for i, (part, on_device, out) in enumerate(zip(self.parts, device_parts, spectra, strict=True)):
 
             def on_progress(done: float, step: int = i) -> None:
-                request.report("echo", round(900 * (step + done) / len(held)), 1000)
+                request.report("echo", round(900 * (step + done) / len(device_parts)), 1000)
 
             part.add(on_device, self.frequencies, out, request.budget, self.folder, on_progress)
         whole = [made for out in spectra for made in out]

@@ -53,5 +53,5 @@ def chirp_ripple(waveform: Waveform, frequencies: np.ndarray) -> np.ndarray:
     rate = waveform.bandwidth / waveform.duration
     a, b = waveform.duration * np.sqrt(rate / 2), (frequencies - waveform.center) * np.sqrt(2 / rate)
     (sine, cosine), (other_sine, other_cosine) = scipy.special.fresnel(a + b), scipy.special.fresnel(a - b)
-    made = np.asarray((1 - 1j) / 2 * (cosine + other_cosine + 1j * (sine + other_sine)))
-    return made.conj() if waveform.kind == "down-chirp" else made
+    integral = np.asarray((1 - 1j) / 2 * (cosine + other_cosine + 1j * (sine + other_sine)))
+    return integral.conj() if waveform.kind == "down-chirp" else integral

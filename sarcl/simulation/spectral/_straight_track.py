@@ -10,8 +10,6 @@ from ...base.constants import SPEED_OF_LIGHT
 from ...base.errors import NotApplicable
 from ...model.trajectory import Trajectory
 
-LEAST_COSINE = 0.3  # of the squint: nearer to the track's direction the range kernels change too fast along the track
-
 
 @dataclass(frozen=True, eq=False)
 class StraightTrack:

@@ -114,9 +114,13 @@ def _planned_part(
         gain, fixed = prepared.subdivision.gain, prepared.subdivision.plan.predicted_error
         random = not scatterers.is_mirror
     amplitudes = ScattererAmplitudes(
-        scatterers, prepared.weights, line, request.polarizations, request.vertical,
+        scatterers,
+        prepared.weights,
+        line,
+        request.polarizations,
+        request.vertical,
         share if task.variant == "exact" else None,
-    )  # fmt: skip
+    )
     time = PlanningTime.of_echo(
         line.n_pulses, len(amplitudes.azimuth), len(task.frequencies), len(request.polarizations), of_facets, longest
     )
