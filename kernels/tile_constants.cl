@@ -113,8 +113,9 @@ __kernel void tile_constants(tile_constants_numbers given, __global const float 
                              __global float *restrict out) {
     int n = given.n;
     size_t g = get_global_id(0), k = given.first + get_global_id(1);
-    pulse_path path = load_path(pulse, g, n, load_point(tile, k, given.n_tiles));
-    out += (get_global_id(1) * (size_t)n + g * VW) * N_CONST;
+    point x = load_point(tile, k, given.n_tiles);
+    out += (get_global_id(1) * (size_t)n + g * VW) * N_CONST;  // before the paths: fewer registers on GPUs
+    pulse_path path = load_path(pulse, g, n, x);
     wv u[3], v[3];
     put_direction(out, C_UX, C_LOW, path.tx, path.tx_range, u);
     if (BISTATIC) {
@@ -203,8 +204,9 @@ __kernel void line_constants(line_constants_numbers given, __global const float 
     int fine = given.fine;
     int n = given.n;
     size_t g = get_global_id(0), k = given.first + get_global_id(1);
-    pulse_path path = load_path(pulse, g, n, load_point(tile, k, given.n_tiles));
-    out += (get_global_id(1) * (size_t)n + g * VW) * N_LINE;
+    point x = load_point(tile, k, given.n_tiles);
+    out += (get_global_id(1) * (size_t)n + g * VW) * N_LINE;  // before the paths: fewer registers on GPUs
+    pulse_path path = load_path(pulse, g, n, x);
     wv along_x, along_y, second_x, second_y, zero = w_make((fv)0, (fv)0);
     project(out, L_UX, path.tx, path.tx_range, axes, &along_x, &along_y);
     if (BISTATIC) {
