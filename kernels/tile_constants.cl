@@ -26,16 +26,19 @@ typedef struct {
     wv kappa, sigma;
 } pulse_path;
 
-// Paths of VW pulses, vector g of n pulses, to a tile's reference point x.
+// Paths of VW pulses, vector g of n pulses, from the transmitter to a tile's reference point x.
 static inline pulse_path load_path(__global const float *pulse, size_t g, int n, point x) {
     pulse_path path;
     size_t lo = (size_t)N_PULSE * n;
     path.delta = path_difference(load_antenna(pulse, P_TX, g, n, 0), w_load(pulse + P_TR * n, g, lo), x, &path.tx_range, &path.tx);
-    if (BISTATIC) {
-        wv second = path_difference(load_antenna(pulse, P_RX, g, n, 0), w_load(pulse + P_RR * n, g, lo), x, &path.rx_range, &path.rx);
-        path.delta = mean_of(path.delta, second);
-    }
     return path;
+}
+
+// Adds those from the receiver, once the transmitter's direction is written: fewer registers on GPUs.
+static inline void add_receiver(pulse_path *path, __global const float *pulse, size_t g, int n, point x) {
+    size_t lo = (size_t)N_PULSE * n;
+    wv second = path_difference(load_antenna(pulse, P_RX, g, n, 0), w_load(pulse + P_RR * n, g, lo), x, &path->rx_range, &path->rx);
+    path->delta = mean_of(path->delta, second);
 }
 
 // Records of points and of lines hold in one order, from a component `first` on: cycles, position (fraction, then the sample's
@@ -113,11 +116,13 @@ __kernel void tile_constants(tile_constants_numbers given, __global const float 
                              __global float *restrict out) {
     int n = given.n;
     size_t g = get_global_id(0), k = given.first + get_global_id(1);
-    pulse_path path = load_path(pulse, g, n, load_point(tile, k, given.n_tiles));
-    out += (get_global_id(1) * (size_t)n + g * VW) * N_CONST;
+    point x = load_point(tile, k, given.n_tiles);
+    out += (get_global_id(1) * (size_t)n + g * VW) * N_CONST;  // before the paths: fewer registers on GPUs
+    pulse_path path = load_path(pulse, g, n, x);
     wv u[3], v[3];
     put_direction(out, C_UX, C_LOW, path.tx, path.tx_range, u);
     if (BISTATIC) {
+        add_receiver(&path, pulse, g, n, x);
         put_direction(out, C_RX, C_RX_LOW, path.rx, path.rx_range, v);
 #pragma unroll
         for (int i = 0; i < 3; i++) u[i] = mean_of(u[i], v[i]);
@@ -203,11 +208,13 @@ __kernel void line_constants(line_constants_numbers given, __global const float 
     int fine = given.fine;
     int n = given.n;
     size_t g = get_global_id(0), k = given.first + get_global_id(1);
-    pulse_path path = load_path(pulse, g, n, load_point(tile, k, given.n_tiles));
-    out += (get_global_id(1) * (size_t)n + g * VW) * N_LINE;
+    point x = load_point(tile, k, given.n_tiles);
+    out += (get_global_id(1) * (size_t)n + g * VW) * N_LINE;  // before the paths: fewer registers on GPUs
+    pulse_path path = load_path(pulse, g, n, x);
     wv along_x, along_y, second_x, second_y, zero = w_make((fv)0, (fv)0);
     project(out, L_UX, path.tx, path.tx_range, axes, &along_x, &along_y);
     if (BISTATIC) {
+        add_receiver(&path, pulse, g, n, x);
         project(out, L_VX, path.rx, path.rx_range, axes, &second_x, &second_y);
         along_x = mean_of(along_x, second_x);
         along_y = mean_of(along_y, second_y);

@@ -120,3 +120,20 @@ def test_look_up_equals_its_twin(device, monkeypatch, taps):
     wanted = interpolate(row, places, made)
     # places near sample 200 are rounded to 2^-17 before this code sees them; the twin sees the same
     assert np.abs(re + 1j * im - wanted).max() < 3e-6 * np.abs(row).max()
+
+
+def test_a_row_of_any_length_joins_its_total_with_the_error_of_each_addition(device, monkeypatch):
+    lanes, times = device.info.vector_width, 4000
+    stride = 2 * lanes + 1  # the last numbers of a row fill no vector
+    row = np.random.default_rng(5).uniform(0.5, 1, 2 * stride).astype(np.float32)
+    body = (
+        f"for (int m = 0; m < {times}; m++) {{ for (int k = 0; k < {row.size}; k++) out[k] = table[k];"
+        f"empty_into_total(out, {stride}); }}"
+    )
+    macros = {"TAPS": 4, "CHANNELS": 1, "GROUPED": 0, "table": row}
+    one = np.ones((1, lanes), np.float32)
+    out = probe(device, monkeypatch, body, one, 18, ("common.clh", "spread_rows.clh"), **macros).ravel()
+    cleared, total, error = out[: 6 * stride].reshape(3, -1).astype(np.float64)
+    assert (cleared == 0).all()
+    # each addition rounds to 2^-24 of the total, and so does the sum of these errors; without them 1e-5 is lost
+    assert (np.abs(total + error - times * row.astype(np.float64)) < times**2 * 2.0**-48 * total).all()
