@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,6 +18,9 @@ from ..model.trajectory import Trajectory
 from ..model.waveform import Waveform
 from ..numerics.pulse_geometry import PulseGeometry
 from ..opencl.device import Device
+
+if TYPE_CHECKING:
+    from ..opencl.device import Buffer
 
 MOST_NODES = 16  # frequencies, Chebyshev nodes over the band
 # of a tolerance: the most that rounding of gains in float32 may take, and with it their interpolation over the band
@@ -193,7 +196,7 @@ class AntennaWeights:
             "SPREADING": int(self.radar is not None),
         }
 
-    def upload(self, device: Device) -> tuple[object, int]:
+    def upload(self, device: Device) -> tuple[Buffer, int]:
         """Patterns on a device, one after the other, and the index at which the second begins."""
         packed = [one.packed(self.frequency) for one in self.patterns] or [np.zeros(1, np.float32)]
         return device.upload(np.concatenate(packed)), len(packed[0])

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..base import host_memory
 from ..base.text import size_text
+from ..base.types import PathLike
 from ..base.validation import sealed
 from ..io import formats
 from ..io.sarcl_hdf5 import ROW_BYTES
@@ -44,7 +45,9 @@ class EchoOutput:
     MemoryError gives the bytes that they would take; for a file, the errors of `output_paths.check_writable`.
     """
 
-    def __init__(self, shape: tuple[int, ...], out: object, budget: float, window: tuple[float, float]) -> None:
+    def __init__(
+        self, shape: tuple[int, ...], out: PathLike | None, budget: float, window: tuple[float, float]
+    ) -> None:
         check_name(out)
         self.shape, self.writer, self.whole = shape, None, np.zeros(0, np.complex64)
         self.a_pulse = int(np.prod(shape[1:-1], dtype=np.int64))
