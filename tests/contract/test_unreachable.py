@@ -222,7 +222,7 @@ def test_a_scenario_hands_on_the_image_that_missed_its_tolerance(monkeypatch):
     def missed(raw, grid, *, tolerance):
         raise sarcl.ToleranceMissed(1e-3, 2e-3, "the image")
 
-    monkeypatch.setattr("sarcl.imaging.backproject.backproject", missed)
+    monkeypatch.setattr("sarcl.verbs.backproject", missed)
     scenario = loads(TOO_FINE, name="f.toml")
     with pytest.raises(sarcl.ToleranceMissed, match=r"^tolerance 1\.0e-03 was missed") as caught:
         scenario.focus(RAW, PLANE)
@@ -375,7 +375,6 @@ MAY_CATCH = {
     "io/_ply.py": "words of text that are no numbers",
     "io/mesh.py": "trimesh's readers of damaged files",
     "io/_other_files.py": "paths that are no names of files",
-    "io/toml.py": "what Python says of an integer of thousands of digits",
     "io/xml/parser.py": "XML that cannot be read",
     "io/sarcl_hdf5.py": "h5py's reader of damaged files",
     "fullwave/bodies/materials.py": "the number of the part is put before a message, which is raised again",
