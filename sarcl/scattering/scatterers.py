@@ -15,7 +15,7 @@ from ..numerics.pulse_geometry import PulseGeometry
 from ..opencl.device import Device
 from ..scene import triangles as geometry
 from ..scene.scene import Scene
-from ..scene.terrain import above, check_above, clear_of, facets_on
+from ..scene.terrain import Heights, above, check_above, clear_of, facets_on
 from ..visibility.illumination import ALL_DARK, Illumination, lit
 from ..visibility.lit_parts import ON_PLANE, FacetPieces, LitParts
 from ._random_surface import Pieces
@@ -231,20 +231,24 @@ class Casters:
 
     solid  facets that stand on a terrain, or all where there is none, m (n, 3, 3);  floor  the terrain's, m (m, 3, 3)
     hidden_by_floor  facets of the scene that its terrain may hide from an antenna (k,) bool
+    heights, on_heights  the terrain, None where there is none, and the facets that lie on it (k,) bool
     """
 
     solid: np.ndarray
     floor: np.ndarray
     hidden_by_floor: np.ndarray
+    heights: Heights | None
+    on_heights: np.ndarray
 
     @classmethod
     def of(cls, scene: Scene, antennas: PulseGeometry) -> Casters:
         """Those of a scene, its terrain by its facets where it is complete."""
         on = None if scene.heights is None else facets_on(scene.heights, scene.triangles)
         if scene.heights is None or on is None:
-            return cls(scene.triangles, scene.triangles[:0], np.zeros(len(scene.triangles), bool))
+            nowhere = np.zeros(len(scene.triangles), bool)
+            return cls(scene.triangles, scene.triangles[:0], nowhere, None, nowhere)
         clear = clear_of(scene.heights, scene.triangles, on, antennas.ends)
-        return cls(scene.triangles[~on], scene.triangles[on], ~clear)
+        return cls(scene.triangles[~on], scene.triangles[on], ~clear, scene.heights, on)
 
     @property
     def hides_any(self) -> bool:
@@ -265,7 +269,7 @@ class Casters:
 
         The pieces are without random heights: displaced along their normals they would occlude their neighbours.
         """
-        ground = (self.floor, self.hidden_by_floor[of]) if len(self.floor) else None
+        ground = (self.floor, self._pieces_hidden_by_floor(pieces, of, antennas)) if len(self.floor) else None
         return lit(
             pieces.triangles,
             antennas.tx,
@@ -281,6 +285,15 @@ class Casters:
             device=device,
             progress=progress,
         )
+
+    def _pieces_hidden_by_floor(self, pieces: Scene, of: np.ndarray, antennas: PulseGeometry) -> np.ndarray:
+        """Pieces of facets `of` (k,) that the terrain may hide (k,): of a wall, those near the ground alone."""
+        is_hidden = self.hidden_by_floor[of]
+        rows = np.flatnonzero(is_hidden)
+        if self.heights is not None and len(rows):
+            on = self.on_heights[of[rows]]
+            is_hidden[rows] = ~clear_of(self.heights, pieces.triangles[rows], on, antennas.ends)
+        return is_hidden
 
 
 def check_antennas_above(scene: Scene, antennas: PulseGeometry) -> None:
