@@ -23,6 +23,9 @@ class ErrorTerm:
     value: float
     remedy: str
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "value", float(self.value))  # NumPy's numbers too
+
 
 def root_sum_square(terms: Iterable[ErrorTerm]) -> float:
     """Root of the sum of the squares of terms."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
 
+from ..base import arguments
 from ..base.errors import confirm_tolerance
 from ..base.options import option
 from ..base.types import PathLike
@@ -44,7 +45,7 @@ class FocusOptions(RunOptions):
 def check_output(out: PathLike | None) -> None:
     """ValueError or OSError where no image can be written at `out`."""
     if out is not None:
-        formats.writer_functions(out, "image")
+        formats.writer_functions(arguments.path("out", out), "image")
         output_paths.check_writable(out)
 
 

@@ -46,7 +46,8 @@ def plan(*args: Any, **options: Any) -> Forecast[Any]:
     run() carries out this very plan; ValueError where a file of echoes has changed meanwhile. TypeError for what is no
     verb, and for options that the verb does not have; else plan raises and warns as the verb does.
     """
-    verb, subjects = (args[0], args[1:]) if args and callable(args[0]) else (__getattr__("backproject"), args)
+    is_short = not args or isinstance(args[0], PhaseHistory)  # plan(raw, grid, ...)
+    verb, subjects = (__getattr__("backproject"), args) if is_short else (args[0], args[1:])
     planned = getattr(verb, "planned", None)
     if planned is None:
         raise TypeError(

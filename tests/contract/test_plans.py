@@ -164,10 +164,16 @@ def test_a_file_that_is_gone_is_refused(name, tmp_path):
         forecast.run()
 
 
-@pytest.mark.parametrize("thing", [sarcl.compress, sarcl.ImageGrid, print], ids=lambda thing: thing.__name__)
+@pytest.mark.parametrize("thing", [sarcl.compress, sarcl.ImageGrid, print, None, "echo"])
 def test_what_is_no_verb_is_refused(thing):
     with pytest.raises(TypeError, match=r"which is no verb; give one of echo, .*backproject"):
         sarcl.plan(thing, noise(), GRID)
+
+
+@pytest.mark.parametrize("verb", [sarcl.polar_format, sarcl.range_doppler], ids=lambda verb: verb.__name__)
+def test_an_output_that_is_no_path_is_named_before_the_work(verb):
+    with pytest.raises(TypeError, match=r"out is a int; give the name of a file"):
+        sarcl.plan(verb, noise(), *([GRID] if verb is sarcl.polar_format else []), out=3)
 
 
 def test_subjects_that_are_missing_are_named():
