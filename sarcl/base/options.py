@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from dataclasses import Field, dataclass, field, fields
+from dataclasses import Field, dataclass, field, fields, replace
 from typing import Any
 
 Check = Callable[[str, Any], Any]
@@ -28,7 +28,8 @@ class Option:
 
 
 def option(default: Any, doc: str = "", check: Check | None = None, *, in_files: bool = True) -> Any:
-    """The field of an option. Without `doc` and `check`: another default of an option that the record inherits."""
+    """The field of an option. Where the record inherits the option, `doc` and `check` may be left out: those of the
+    nearest base count."""
     return field(default=default, metadata={_KEY: Option(inspect.cleandoc(doc), check, in_files)})
 
 
@@ -42,9 +43,9 @@ class Options:
     """Base class of records of options: checks every field, in their order, when one is made."""
 
     def __post_init__(self) -> None:
-        for name, (_, told) in described(type(self)).items():
-            if told.check:
-                object.__setattr__(self, name, told.check(name, getattr(self, name)))
+        for name, (_, details) in described(type(self)).items():
+            if details.check:
+                object.__setattr__(self, name, details.check(name, getattr(self, name)))
 
 
 def described(record: type[Options]) -> dict[str, tuple[Field[Any], Option]]:
@@ -57,11 +58,19 @@ def described(record: type[Options]) -> dict[str, tuple[Field[Any], Option]]:
 
 
 def _declared(record: type[Options], own: Field[Any]) -> tuple[tuple[int, int], Option]:
-    """Where an option is documented (steps up a record's bases, place in that one), and that Option."""
+    """Where an option is documented (steps up a record's bases, place in that one), and that Option, with the nearest
+    check that any of them has."""
+    documented: tuple[tuple[int, int], Option] | None = None
     for depth, kind in enumerate(record.__mro__):
-        declared = list(inspect.get_annotations(kind))
-        if own.name in declared:
-            told: Option | None = vars(kind)["__dataclass_fields__"][own.name].metadata.get(_KEY)
-            if told and told.doc:
-                return (depth, declared.index(own.name)), told
-    raise TypeError(f"{record.__name__}.{own.name} has no documentation; declare it by option(default, doc)")
+        names = list(inspect.get_annotations(kind))
+        if own.name not in names:
+            continue
+        details: Option = vars(kind)["__dataclass_fields__"][own.name].metadata.get(_KEY, Option("", None, True))
+        if documented is None and details.doc:
+            documented = (depth, names.index(own.name)), details
+        if documented and details.check:
+            place, first = documented
+            return place, first if first.check else replace(first, check=details.check)
+    if documented is None:
+        raise TypeError(f"{record.__name__}.{own.name} has no documentation; declare it by option(default, doc)")
+    return documented

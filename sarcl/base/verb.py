@@ -82,7 +82,7 @@ def result_of(annotation: str) -> str:
 
 def listed(record: type[Options]) -> str:
     """The options of a record, one below the other, as the docstring of its verb has them."""
-    texts = {name: told.doc for name, (_, told) in described(record).items()}
+    texts = {name: details.doc for name, (_, details) in described(record).items()}
     column = max(len(name) for name in texts if len(name) <= 13) + 2
     lines = []
     for name, text in texts.items():

@@ -156,9 +156,11 @@ def _focus_grid(p: argparse.ArgumentParser) -> None:
 def _focus_method(p: argparse.ArgumentParser) -> None:
     """Options of the method."""
     how = p.add_argument_group("focusing")
-    usual, fast = (f"{DEFAULTS[verb]['tolerance']:g}" for verb in ("backproject", "polar_format"))
+    default, of_fast = (f"{DEFAULTS[verb]['tolerance']:g}" for verb in ("backproject", "polar_format"))
     how.add_argument(
-        "--tolerance", type=float, help=f"relative error allowed (default {usual}; polar_format, range_doppler: {fast})"
+        "--tolerance",
+        type=float,
+        help=f"relative error allowed (default {default}; polar_format, range_doppler: {of_fast})",
     )
     how.add_argument(
         "--method",

@@ -112,7 +112,7 @@ def parameters(call: Call) -> dict[str, inspect.Parameter]:
     signature = inspect.signature(call).parameters
     known = {n: p for n, p in signature.items() if n not in NOT_KEYS}
     if hasattr(call, "options"):
-        known = {n: signature[n] for n, (_, told) in described(call.options).items() if told.in_files}
+        known = {n: signature[n] for n, (_, details) in described(call.options).items() if details.in_files}
     return {RENAMED.get(n, n): p.replace(default=None) if may_be_left_out(p) else p for n, p in known.items()}
 
 

@@ -81,5 +81,4 @@ class SceneOptions(TrackOptions):
     check: bool | None = option(
         None,
         "recompute 256 random samples exactly, fewer above 20 000 facets; None: where that costs less than 2 %",
-        or_none(flag),
     )

@@ -139,7 +139,7 @@ def _shadow_terms(request: EchoRequest, scene: Scene, facets: FacetSet | None) -
 
 
 def warn_of_curves(plan: ScenePlan) -> dict[str, Any]:
-    """Warn of facets that are too large for the curves that they stand for; returns what a report says of them."""
+    """Warn of facets that are too large for the curves that they approximate; returns what a report says of them."""
     if plan.subdivision is None:
         return {}
     return _warned(facet_error.judge(plan.seen.original, plan.seen.antennas, plan.seen.waveform))

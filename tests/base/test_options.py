@@ -84,6 +84,18 @@ def test_documentation_and_check_are_inherited_with_a_default_alone_and_replaced
     assert base["device"][1].doc == "where it runs;\nNone: anywhere" and base["device"][1].check is None
 
 
+def test_other_words_keep_the_check_of_the_inherited_option():
+    @dataclass(frozen=True, eq=False, kw_only=True)
+    class Reworded(Base):
+        """Other words for an inherited option."""
+
+        height: float = option(2, "height of a wall, m")
+
+    assert described(Reworded)["height"][1].doc == "height of a wall, m" and Reworded(height=5).height == 10.0
+    with pytest.raises(ValueError, match="height is -1"):
+        Reworded(height=-1)
+
+
 def test_what_is_for_files_is_said_with_the_words():
     assert [name for name, (_, told) in described(Base).items() if not told.in_files] == ["device"]
     assert described(Derived)["device"][1].in_files

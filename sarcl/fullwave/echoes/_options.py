@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 from ...base.options import option
 from ...base.types import PathLike
 from ...base.validation import flag
-from ...base.validation import tolerance as allowed_error
 from ...simulation.track_options import Polarization, TrackOptions, file_name, polarizations
 
 
@@ -54,7 +53,6 @@ class FullwaveOptions(TrackOptions):
     tolerance: float = option(
         3e-2,
         "L2 error of waveform forming: of the samples against those of a run at every pulse, on the same grid",
-        lambda name, value: allowed_error(value),
     )
     check: bool = option(False, "one run more per polarisation sent, between anchors: report.measured_error", flag)
     model_error: bool = option(

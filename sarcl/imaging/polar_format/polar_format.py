@@ -12,7 +12,6 @@ from ...base.options import option
 from ...base.report import ErrorTerm, Report, terms_of_sum
 from ...base.stage_timer import Clock
 from ...base.validation import instance
-from ...base.validation import tolerance as allowed_error
 from ...base.verb import verb
 from ...model.image import Image
 from ...model.image_grid import ImageGrid
@@ -41,7 +40,6 @@ class PolarFormatOptions(GridOptions):
         1e-2,
         "L2 error allowed against the sum of plane waves, relative to the larger of the norm of I and the norm of "
         "samples that add with random phases, sqrt(pixels sum |w s|^2)",
-        lambda name, value: allowed_error(value),
     )
 
 

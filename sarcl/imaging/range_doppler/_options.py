@@ -9,8 +9,7 @@ from typing import Literal
 import numpy as np
 
 from ...base.options import option, or_none
-from ...base.validation import array, flag, number
-from ...base.validation import tolerance as allowed_error
+from ...base.validation import array, number
 from ...earth.elevation import ElevationModel
 from ..focus_options import FocusOptions
 
@@ -102,13 +101,10 @@ class RangeDopplerOptions(FocusOptions):
         1e-2,
         "L2 error allowed against `backproject` at the same positions, relative to the larger of the norm of the image "
         "and the norm of the same contributions with random phases",
-        lambda name, value: allowed_error(value),
     )
     max_bytes: float | None = option(
         None,
         "memory for blocks on the device, as `backproject` takes it; arrays of all pulses or Doppler bins that are "
         "larger than a third of it, or of half the machine's memory, are temporary files",
     )
-    check: bool | None = option(
-        None, "compute 128 random pixels exactly; None: where that costs less than 2 %", or_none(flag)
-    )
+    check: bool | None = option(None, "compute 128 random pixels exactly; None: where that costs less than 2 %")

@@ -76,7 +76,7 @@ class Speckle:
 def judge(scene: Scene, antennas: PulseGeometry, waveform: Waveform, represents: float = 1.0) -> Speckle:
     """Speckle of a scene's facets after cutting: of rough ones, and of those that random heights displace.
 
-    represents  number of facets that each of these stands for
+    represents  number of facets that each of these represents
     With an antenna at the scene's centre, or forward scattering, there is no resolution cell and no verdict. TypeError
     names a wrong type.
     """

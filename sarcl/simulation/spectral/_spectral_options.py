@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 
 from ...base.options import option, or_none
 from ...base.validation import choice, flag
-from ...base.validation import tolerance as allowed_error
 from ...model.antenna_array import AntennaArray
 from ...model.trajectory import Trajectory
 from ...numerics import plan
@@ -63,11 +62,9 @@ class SpectralEchoOptions(SceneOptions):
         1e-2,
         "L2 error of the samples, relative to the larger of their norm and the norm that they would have if scatterers "
         "added with random phases",
-        lambda name, value: allowed_error(value),
     )
     check: bool | None = option(
         None,
         "recompute samples at 16 random pulses exactly, fewer above 20 000 facets: report.measured_error; None: where "
         "that takes about a second at most",
-        or_none(flag),
     )
