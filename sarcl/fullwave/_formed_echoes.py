@@ -8,7 +8,7 @@ difference of the paths from the transmitter T of this pulse, and the field at t
 these currents. k is the wavenumber that was asked for; at the frequency at which the grid's wave from T has it, the
 grid's wave towards R has k_r, and g, g_r, e_r, h_r as in _far_field. In the direction of the run itself this is
 `_far_field.amplitude`. Source: B. Zou, Y. Jia and Z. Qiao, Proc. SPIE 11742 (2021), equations (4) to (6);
-docs/theory/full_wave.md.
+docs/theory/waveform_forming.md.
 """
 
 from __future__ import annotations

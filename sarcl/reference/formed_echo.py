@@ -19,7 +19,7 @@ def current_sums(
 
     offset, current  cells from the centre, m (n, 3), and their currents (F, n) under a wave along `travel` (3,)
     sent, received   wavenumbers, rad/m (F,) and (P, F);  tx, rx  antennas from the centre, m (P, 3)
-    The sums are complex128 (P, F). Source: docs/theory/full_wave.md, Waveform forming.
+    The sums are complex128 (P, F). Source: docs/theory/waveform_forming.md.
     """
     out, there, back = np.empty(received.shape, complex), longer(tx, offset) - offset @ travel, longer(rx, offset)
     for f, values in enumerate(current):
