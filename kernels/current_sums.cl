@@ -16,7 +16,7 @@
 //           GROUP     work-items of a group along the pulses, which keep paths in local memory: on GPUs private arrays that
 //                     are indexed by variables lie in global memory; 0: groups of any size, paths in private memory
 //           LINEAR    1: the phase is linear in the frequency over BLOCK frequencies, and followed by complex products
-// reference: sarcl/reference/formed_echo.py:current_sums
+// reference: sarcl/reference/equations.py:current_sums
 
 #include "common.clh"
 

@@ -1,6 +1,6 @@
 """Full-wave scattering on a Yee grid (FDTD), and fullwave_echo().
 
-docs/theory/full_wave.md has the equations; docs/developers/full_wave.md the arrays, and what each part hands to the next.
+docs/theory/full_wave.md has the equations; docs/developers/full_wave.md has the arrays, and what files hand on.
 
 For other folders:
 

@@ -9,7 +9,7 @@ from sarcl.fullwave._currents import Currents
 from sarcl.fullwave._incident import PlaneWave
 from sarcl.fullwave._pulse import Pulse
 from sarcl.fullwave.lattice import Lattice
-from sarcl.reference import formed_echo
+from sarcl.reference import equations
 
 CELL = 0.02  # m
 RANGE = 1.1e3  # m
@@ -44,7 +44,7 @@ def antennas(currents, n, spread, distance=RANGE, seed=1):
 def twin(currents, paths, tx, rx):
     out = []
     for _, offset, values in _current_sums._by_component(currents):
-        out.append(formed_echo.current_sums(
+        out.append(equations.current_sums(
             offset, values(slice(None)), currents.wave.travel, paths.sent, paths.received, tx - currents.centre,
             rx - currents.centre,
         ))  # fmt: skip

@@ -10,7 +10,7 @@ import sarcl
 from sarcl import shapes
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.numerics import cost_model
-from sarcl.reference.echo import echo as exact_echo
+from sarcl.reference.equations import point_echo as exact_echo
 from sarcl.simulation import _facet_spreading, _kernel_images, _point_spreading, echo_check
 
 CHIRP = sarcl.Waveform.chirp(center=9.6e9, bandwidth=200e6, duration=1e-6)
