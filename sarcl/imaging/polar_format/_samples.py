@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
 from ...numerics.range_profiles import LARGEST
 from ...numerics.weighted_samples import WeightedSamples
 from ...opencl import fft
-from ...opencl.device import Device
+from ...opencl.device import Buffer, Device
 from ...opencl.pipeline import Pipeline
 from ..focusing_task import FocusingTask
 from ._wavefront import Waves
-
-if TYPE_CHECKING:
-    from ...opencl.device import Buffer
 
 
 class WeightedRows:
