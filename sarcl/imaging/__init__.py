@@ -5,7 +5,6 @@ For other folders:
     antenna_beam     an antenna as the beam of an image: the matched filter of its pattern
     backproject      backproject(): an image to a stated tolerance
     choose_method    the cheapest method that meets the tolerance
-    collection       what an image keeps of the data that it was made from
     compress         compress(): pulse compression
     default_grid     a grid for data that come without one
     engine           what every method offers: a plan, and an engine that makes bands on one device

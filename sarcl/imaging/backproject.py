@@ -25,8 +25,8 @@ from ._row_coverage import room_for_gain, seen_by
 from .antenna_beam import shares
 from .backproject_options import BackprojectOptions
 from .choose_method import MethodChoice, choose
-from .collection import collection
 from .engine import Skipped
+from .focus_options import collection
 from .focusing_task import FocusingTask
 from .forecast import forecast_of, speed
 from .pixel_taper import PixelTaper

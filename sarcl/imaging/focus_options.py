@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from numpy.typing import ArrayLike
 
-from ..base import arguments
+from ..base import arguments, wgs84
 from ..base.errors import confirm_tolerance
 from ..base.options import option
 from ..base.types import PathLike
 from ..io import formats, output_paths
 from ..model import store
 from ..model.image import Image
+from ..model.image_grid import ImageGrid
+from ..model.phase_history import PhaseHistory
 from ..numerics.run_options import RunOptions
-from ..numerics.windows import Window
+from ..numerics.windows import Window, in_words
 
 EXACT_PAIR = 3e-8  # s, of the exact sum, per sample and pixel
 CHEAP_CHECK = 0.02  # share of the time of the image: a check that costs less is made by default
@@ -68,3 +71,23 @@ class GridOptions(FocusOptions):
     sum_polarizations: bool = option(
         False, "True: rows of several polarisations are summed coherently; False: they are refused"
     )
+
+
+def collection(raw: PhaseHistory, grid: ImageGrid, window: Window | None) -> dict[str, Any]:
+    """Fields of the Image that echoes are focused to, but data, grid, gain, frequency and report."""
+    middle = raw.n_rows // 2
+    half = raw.frequency_step / 2
+    kinds = [] if raw.polarization is None else sorted(set(raw.polarization.tolist()))
+    speeds = {n: getattr(raw, n) for n in ("tx_velocity", "rx_velocity")}
+    if raw.is_monostatic and speeds["rx_velocity"] is None:
+        speeds["rx_velocity"] = speeds["tx_velocity"]
+    return {
+        "tx": raw.tx[middle],
+        "rx": raw.rx[middle],
+        **{name: None if speed is None else speed[middle] for name, speed in speeds.items()},
+        "time": None if raw.time is None else (raw.time.min(), raw.time.max()),
+        "band": ((raw.frequency - half).min(), (raw.frequency + (raw.n_samples - 1) * raw.frequency_step + half).max()),
+        "window": in_words(window),
+        "polarization": "+".join(kinds) or None,
+        "frame": "local" if wgs84.vertical_at(grid.bounds.mean(axis=0)) is None else "earth-fixed",
+    }

@@ -24,6 +24,5 @@ For this folder alone:
 
     _costas           Costas permutations by the constructions of Welch and Golomb
     _orbit_arguments  arguments of Orbit: positions, spans of time
-    _orbit_attitude   attitudes of antennas in orbit, and directions around a beam
     _time_samples     samples in time as samples over frequency, for PhaseHistory.from_time
 """

@@ -17,8 +17,7 @@ from ..earth.kepler import KeplerElements
 from ..earth.state_vectors import StateVectors
 from ..earth.two_line import TwoLineElements
 from ..io import orbit_files
-from ._orbit_arguments import places, span_of, together
-from ._orbit_attitude import Attitude, axes_of, ellipse
+from ._orbit_arguments import Attitude, axes_of, ellipse, places, span_of, together
 from .dates import Date, date, seconds
 from .trajectory import BYTES_PER_PULSE, Trajectory
 

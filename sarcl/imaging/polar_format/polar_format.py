@@ -21,8 +21,7 @@ from ...numerics.nufft2d import Gridder, make_plan, tile_of
 from ...numerics.range_profiles import check_digits
 from ...opencl import memory_budget
 from ...opencl.choose_device import open_device
-from ..collection import collection
-from ..focus_options import GridOptions, check_output, finished
+from ..focus_options import GridOptions, check_output, collection, finished
 from ..focusing_task import FocusingTask, make_task
 from ..forecast import speed
 from ._samples import WeightedRows

@@ -20,8 +20,7 @@ from ._doppler import centroid_of_data, centroid_of_geometry, sine
 from ._extent import Extent, View, choose_extent
 from ._ground import Ground
 from ._host_rows import Budget
-from ._looks import TwoLooks
-from ._map_drift import converged
+from ._map_drift import TwoLooks, converged
 from ._options import RangeDopplerOptions
 from ._plan import FocusPlan, make_plan
 from ._track import REMEDY, Track

@@ -12,5 +12,4 @@ For other folders:
 For this folder alone:
 
     _shares        which device makes which bands of an image
-    _fingerprint   everything an image's pixels depend on, as text and checksums
 """
