@@ -20,7 +20,7 @@ For this folder alone:
     _collada_checks  surfaces of COLLADA files that would be left out or covered wrongly in silence: refused
     _gltf_checks   surfaces of glTF files that would be left out in silence: refused
     _gotcha        AFRL Gotcha volumetric SAR data set, MATLAB 5
-    _hdf5_safety   HDF5 files that lead into others, declare too much or never end: refused
+    _hdf5_safety   HDF5 files that lead into others: refused
     _mat5_checks   the structure of a MATLAB 5 file, walked before scipy reads it
     _mesh_archive  meshes in archives
     _mesh_checks   faces that a mesh file declares and holds; polygons and the fans that cover them
