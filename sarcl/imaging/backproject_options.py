@@ -18,7 +18,6 @@ from ..numerics import cost_model
 from ..numerics.cost_model import DeviceClass
 from ..opencl import native_functions
 from ..opencl.device import Device, DeviceChoice
-from ..opencl.memory_budget import budget
 from .choose_method import METHODS, MethodChoice, choose
 from .focus_options import GridOptions
 from .focusing_task import BeamCone, FocusingTask, Skip, make_task
@@ -118,7 +117,3 @@ class BackprojectOptions(GridOptions):
             except MemoryError:
                 return choose(task, "direct", tolerance, on, float64)
         return chosen
-
-    def budget(self, device: Device) -> float:
-        """Bytes that blocks may take on a device."""
-        return min(budget(device, self.max_bytes), device.info.memory)

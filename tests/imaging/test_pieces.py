@@ -540,7 +540,7 @@ def test_every_field_of_a_task_has_its_part_in_the_fingerprint(raw):
         mark_of(More(**known, more=lambda x: x))
 
 
-def test_a_foreign_tile_among_ones_own_is_not_used_and_not_destroyed(raw, whole, tmp_path, caplog):
+def test_a_foreign_tile_among_ones_own_is_not_used(raw, whole, tmp_path, caplog):
     for folder, options in (("a", {}), ("b", {"window": "hamming"})):
         (tmp_path / folder).mkdir()
         half_done(raw, tmp_path / folder / "image.h5", **options)

@@ -12,7 +12,6 @@ from ...base.constants import SPEED_OF_LIGHT
 from ...earth.elevation import ElevationModel
 from ...model.phase_history import PhaseHistory
 from ...numerics import windows
-from ...opencl import memory_budget
 from ...opencl.choose_device import open_device
 from ...opencl.device import Device
 from ..focusing_task import weigh
@@ -110,7 +109,7 @@ def range_doppler_task(raw: PhaseHistory, options: RangeDopplerOptions) -> Range
     centroids = _centroids(raw, track, speed, wavelength, options)
     opened = open_device(options.device)
     budget = Budget(
-        min(memory_budget.budget(opened, options.max_bytes), opened.info.memory),
+        options.budget(opened),
         host_memory.installed() / 2 if options.max_bytes is None else float(options.max_bytes),
     )
     view = View(raw, track, smooth, speed, centroids[1], least)

@@ -16,7 +16,7 @@ from ...base.verb import verb
 from ...model.image import Image
 from ...model.image_grid import ImageGrid
 from ...model.phase_history import PhaseHistory
-from ..focus_options import check_output, collection, finished
+from ..focus_options import check_output, collection, finished, relative_error
 from ..forecast import speed
 from ._doppler import fresnel, sine
 from ._focus import focus
@@ -98,21 +98,15 @@ class RangeDopplerPlan:
         if task.extent.has_beam and plan.band.window is None and task.beyond_beam < -TOLD:
             log.warning(BEYOND, -task.beyond_beam)
         clock.lap("plan")
-
-        def on_progress(share: float) -> None:
-            if self.options.progress:
-                self.options.progress("range Doppler", round(1000 * share), 1000)
-
-        data = focus(Job(task.device, plan, raw, task.track, weight, task.budget), clock, on_progress)
+        job = Job(task.device, plan, raw, task.track, weight, task.budget)
+        data = focus(job, clock, self.options.shares_of("range Doppler"))
         gain: float | np.ndarray = float(task.sample_weight.sum() * task.row_weight.sum())
         if task.extent.has_beam:
             gain = gain_of(plan, task.track, *weight, task.tolerance)
             if isinstance(gain, np.ndarray):
                 data[gain == 0] = 0
-        measured = None
-        if self.options.is_checked(CHECKED * raw.n_rows * raw.n_samples, sum(clock.seconds.values())):
-            measured = _measure_error(raw, task, grid, data)
-            clock.lap("check")
+        pairs, seconds = CHECKED * raw.n_rows * raw.n_samples, sum(clock.seconds.values())
+        measured = self.options.measured(pairs, seconds, clock, lambda: _measure_error(raw, task, grid, data))
         image = Image(
             data,
             grid,
@@ -156,8 +150,7 @@ def _measure_error(raw: PhaseHistory, task: RangeDopplerTask, grid: ImageGrid, d
         t = track.times[:, None]
         longer = (plan.fit.range(u, r, t) - task.known.range(u, r, t)).T
     truth, random = exact(raw, points, task.sample_weight, task.row_weight, wrap=True, share=share, longer=longer)
-    wrong = float(np.linalg.norm(data[index] - truth))
-    return wrong / max(float(np.linalg.norm(truth)), random) if wrong else 0.0
+    return relative_error(data[index], truth, random)
 
 
 def gain_of(

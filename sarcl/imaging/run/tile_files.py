@@ -102,12 +102,8 @@ class TileStore:
             raise
 
     def clear(self) -> None:
-        """Remove this job's files, and the folder unless something else is in it."""
-        for path in _tiles(self.folder):
-            if self._mark_in(path) in (self.mark, None):
-                path.unlink(missing_ok=True)
-        if not _tiles(self.folder):
-            discard(self.folder)
+        """Remove the files, and the folder unless something else is in it."""
+        discard(self.folder)
 
     def _path(self, first: int, last: int) -> Path:
         return self.folder / f"bands-{first:06d}-{last:06d}.tiles"
@@ -168,16 +164,6 @@ class TileStore:
             return None, Skipped(), "does not hold what its name says"
         values = np.frombuffer(data, self.dtype, size // self.dtype.itemsize, start)
         return values.reshape(extent.stop - extent.start, *self.tiling.row_shape), Skipped(**head["skipped"]), ""
-
-    def _mark_in(self, path: Path) -> str | None:
-        """The fingerprint in the head of a file; None where it cannot be read."""
-        try:
-            with open(path, "rb") as file:
-                start = file.read(len(MAGIC) + 8)
-                mark = json.loads(file.read(min(struct.unpack("<Q", start[len(MAGIC) :])[0], 4096)))["job"]
-        except (OSError, ValueError, KeyError, TypeError, struct.error):
-            return None
-        return str(mark)
 
 
 def discard(folder: Path) -> None:
