@@ -92,9 +92,7 @@ class BackprojectOptions(GridOptions):
         instance("grid", grid, ImageGrid)
         if self.mapping is not None:
             if isinstance(self.mapping, dict) and "mapping" not in self.mapping:
-                raise ValueError(
-                    f"mapping is {self.mapping!r:.60}; a dict names the kind too: {{'mapping': 'apparent'}}"
-                )
+                raise ValueError(f"mapping is {self.mapping!r:.60}; a dict needs the kind: {{'mapping': 'apparent'}}")
             raw = map_aperture(raw, **(self.mapping if isinstance(self.mapping, dict) else {"mapping": self.mapping}))
         return raw, make_task(
             raw, grid, self.window, self.weights, self.wrap, self.skip, self.beam, self.sum_polarizations

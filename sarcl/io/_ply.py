@@ -68,9 +68,7 @@ def read(data: bytes, what: str) -> tuple[np.ndarray, np.ndarray]:
     elements_by_name = {element.name: element for element in elements if element.rows}
     for name in elements_by_name:
         if name.startswith("tristrip"):
-            raise ValueError(
-                f"{what} has strips of triangles ({name}), which are not read here; export it as triangles"
-            )
+            raise ValueError(f"{what} has strips of triangles ({name}), which are not read; export triangles")
     if "vertex" not in elements_by_name or "face" not in elements_by_name:
         return np.zeros((0, 3)), np.zeros((0, 3), np.int64)
     vertices = _vertices(elements_by_name["vertex"], body, what)

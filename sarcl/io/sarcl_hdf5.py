@@ -66,9 +66,7 @@ def load(path: PathLike, make: Make[T], autofocus: bool = False, external: bool 
         except _hdf5_safety.Refused as exc:
             raise ValueError(f"{name!r} {exc}") from None
         except MemoryError as exc:
-            raise MemoryError(
-                f"{name!r} holds arrays for which there is no memory ({exc}); read it elsewhere"
-            ) from None
+            raise MemoryError(f"{name!r} holds arrays too large for memory ({exc}); read it elsewhere") from None
         except Exception as exc:  # h5py, json and the objects that are made fail in many ways on a damaged file
             raise ValueError(f"{name!r} is damaged: it holds no whole {kind} ({exc}); save or copy it again") from exc
     except BaseException:

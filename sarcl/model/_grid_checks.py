@@ -30,7 +30,7 @@ def pixels_of(slices: tuple[slice, ...], shape: tuple[int, ...]) -> list[range]:
     ranges = []
     for axis, (n, selection) in enumerate(zip(shape, (*slices, *[slice(None)] * len(shape)), strict=False)):
         if not isinstance(selection, slice):
-            raise IndexError(f"slices[{axis}] is {selection!r:.60}; give a slice for each axis, such as numpy.s_[2:5]")
+            raise IndexError(f"slices[{axis}] is {selection!r:.60}; give slices, such as numpy.s_[2:5]")
         arguments.checked_index(f"slices[{axis}]", "a grid", selection, (n,))
         pixels = range(*selection.indices(n))
         if pixels.step < 0:

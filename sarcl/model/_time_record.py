@@ -140,9 +140,7 @@ def _rf_band(record: TimeRecord, samples: LazyRows, rate: float) -> tuple[float,
     """The band (low, high), Hz, of real samples of the signal itself."""
     waveform, bandwidth = record.waveform, record.bandwidth
     if not _is_real(samples):
-        raise ValueError(
-            f'samples are {samples.dtype}, and kind "rf" is for real ones; complex ones are "compressed" or "chirped"'
-        )
+        raise ValueError(f'samples are {samples.dtype}, and kind "rf" is for real ones; complex ones have other kinds')
     if record.carrier is not None:
         raise ValueError("carrier is the middle of bandwidth=(low, high) where kind is 'rf'; leave it out")
     if waveform is None and record.pulse_time != "start":

@@ -302,9 +302,7 @@ class ImageGrid:
     def positions_of(self, index: tuple[np.ndarray, ...]) -> NDArray[np.float64]:
         """Positions, m (..., 3), of the pixels at whole indices into an image."""
         if not isinstance(index, tuple):
-            raise TypeError(
-                f"index is a {type(index).__name__}; give a tuple of whole numbers, one array for each axis"
-            )
+            raise TypeError(f"index is a {type(index).__name__}; give a tuple of whole numbers, an array per axis")
         if self.listed is None:
             return self.at(*index)
         arguments.checked_index("index", "a grid", index, self.shape)

@@ -200,9 +200,7 @@ class Orbit:
         n_pulses = validation.count("n_pulses", n_pulses)
         validation.room(f"a track of {n_pulses:.3g} pulses", BYTES_PER_PULSE * float(n_pulses), "give fewer pulses")
         if (start is None) == (center is None):
-            raise ValueError(
-                "the time of the track is start or center (s since the epoch, or a date); give one of them"
-            )
+            raise ValueError("the time of the track is start or center (s since the epoch, or a date); give one")
         first = self._time("start", start) if center is None else self._time("center", center)
         if center is not None:
             first -= (n_pulses - 1) / 2 / prf

@@ -121,7 +121,7 @@ class PhaseHistory:
             last = self.frequency + (samples.shape[1] - 1) * self.frequency_step
         if not np.isfinite(last).all():
             raise ValueError(
-                f"frequency_step is {self.frequency_step.max():g} Hz, at which the last frequency is infinite; give Hz"
+                f"frequency_step is {self.frequency_step.max():g} Hz, and the last frequency infinite; give Hz"
             )
         self._set("tx", one_per_row("tx", self.tx, n, np.float64, (3,)))
         if self.rx is None or self.rx is self._rx_of_tx:
