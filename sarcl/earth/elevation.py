@@ -51,9 +51,7 @@ class ElevationModel:
         if height.ndim != 2 or min(height.shape) < 2:
             raise ValueError(f"height has shape {height.shape}; wanted (n_rows, n_columns), two of each at least")
         if np.isinf(height).any() or np.isnan(height).all():
-            raise ValueError(
-                "height is infinite somewhere, or NaN everywhere; give metres, and NaN where data is missing"
-            )
+            raise ValueError("height is infinite somewhere, or NaN everywhere; give metres, NaN where data is missing")
         if np.nanmax(np.abs(height)) > HIGHEST:
             raise ValueError(f"height reaches {np.nanmax(np.abs(height)):.6g} m, which no land has; give metres")
         for name, axis in (("longitude", 1), ("latitude", 0)):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -13,13 +13,10 @@ from ..base.stage_timer import Clock
 from ..numerics import cost_model, device_profiles, range_profiles
 from ..numerics.device_profiles import DeviceProfiles
 from ..numerics.interpolation import Interpolator
-from ..opencl.device import Device
+from ..opencl.device import Buffer, Device
 from ..opencl.pipeline import Pipeline
 from .focusing_task import FocusingTask
 from .tiling.tiling import FlatImage, Run, Tiling
-
-if TYPE_CHECKING:
-    from ..opencl.device import Buffer
 
 UPLOAD = 2**26  # bytes of samples of a block on a GPU: while it computes with these, the host uploads as many
 

@@ -56,7 +56,8 @@ def load(path: PathLike, make: Make[T], autofocus: bool = False, external: bool 
             raise ValueError(f"{name!r} has format {version}, this sarcl reads format {hdf5.FORMAT}; update sarcl")
         kind, rows = ROWS[mark]
         try:
-            _hdf5_safety.check_contents(file, Path(path).stat().st_size, external)
+            if not external:
+                _hdf5_safety.check_links(file)
             dataset = file[rows]
             if sums is not None and sums.rows is not None:
                 dataset = _with_checksums(dataset, sums)
@@ -65,9 +66,7 @@ def load(path: PathLike, make: Make[T], autofocus: bool = False, external: bool 
         except _hdf5_safety.Refused as exc:
             raise ValueError(f"{name!r} {exc}") from None
         except MemoryError as exc:
-            raise MemoryError(
-                f"{name!r} holds arrays for which there is no memory ({exc}); read it elsewhere"
-            ) from None
+            raise MemoryError(f"{name!r} holds arrays too large for memory ({exc}); read it elsewhere") from None
         except Exception as exc:  # h5py, json and the objects that are made fail in many ways on a damaged file
             raise ValueError(f"{name!r} is damaged: it holds no whole {kind} ({exc}); save or copy it again") from exc
     except BaseException:
@@ -90,16 +89,13 @@ def open_rows(path: PathLike, name: str) -> h5py.Dataset:
 
 
 def _verify_checksums(path: PathLike) -> _checksums.Checksums | None:
-    """Checksums of a file after a check of all but its rows; one without checksums is tried in another process."""
+    """Checksums of a file after a check of all but its rows; None where it has none."""
     try:
-        sums = _checksums.of(Path(path))
-        if sums is None:
-            _hdf5_safety.check_readable(path)
+        return _checksums.of(Path(path))
     except _checksums.Truncated as exc:
         raise ValueError(f"{str(path)!r} is truncated or damaged: {exc}; copy it again") from None
-    except (_checksums.Damaged, _hdf5_safety.Refused) as exc:
+    except _checksums.Damaged as exc:
         raise ValueError(f"{str(path)!r} is damaged: {exc}; save or copy it again") from None
-    return sums
 
 
 def _open_file(path: PathLike) -> h5py.File:

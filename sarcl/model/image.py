@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 from ..base import arguments, validation
 from ..base.report import Report
 from ..io import formats, hdf5
-from .image_grid import ImageGrid, pair
+from .image_grid import ImageGrid
 
 if TYPE_CHECKING:
     from types import EllipsisType
@@ -194,7 +194,7 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
         """
         if not self.grid.is_plane and self.grid.times is None:
             raise ValueError("multilook is for images on a plane, or by range_doppler; this grid lists its points")
-        a, b = pair("looks", looks)
+        a, b = validation.pair("looks", looks)
         a, b = validation.count("looks[0]", a), validation.count("looks[1]", b)
         rows, columns = self.grid.shape[0] // a, self.grid.shape[1] // b
         if rows == 0 or columns == 0:

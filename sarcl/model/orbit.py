@@ -17,8 +17,7 @@ from ..earth.kepler import KeplerElements
 from ..earth.state_vectors import StateVectors
 from ..earth.two_line import TwoLineElements
 from ..io import orbit_files
-from ._orbit_arguments import places, span_of, together
-from ._orbit_attitude import Attitude, axes_of, ellipse
+from ._orbit_arguments import Attitude, axes_of, ellipse, places, span_of, together
 from .dates import Date, date, seconds
 from .trajectory import BYTES_PER_PULSE, Trajectory
 
@@ -201,9 +200,7 @@ class Orbit:
         n_pulses = validation.count("n_pulses", n_pulses)
         validation.room(f"a track of {n_pulses:.3g} pulses", BYTES_PER_PULSE * float(n_pulses), "give fewer pulses")
         if (start is None) == (center is None):
-            raise ValueError(
-                "the time of the track is start or center (s since the epoch, or a date); give one of them"
-            )
+            raise ValueError("the time of the track is start or center (s since the epoch, or a date); give one")
         first = self._time("start", start) if center is None else self._time("center", center)
         if center is not None:
             first -= (n_pulses - 1) / 2 / prf

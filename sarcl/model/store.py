@@ -14,11 +14,12 @@ import numpy as np
 
 from ..base import arguments, validation
 from ..io import formats, sarcl_hdf5
+from ._row_fields import PER_ROW
 from .antenna_array import AntennaArray
 from .concatenation import concatenate
 from .image import FIELDS, Image, image_fields
 from .image_grid import ImageGrid
-from .phase_history import PER_ROW, PhaseHistory, phase_history_fields
+from .phase_history import PhaseHistory, phase_history_fields
 from .waveform import Waveform
 
 if TYPE_CHECKING:

@@ -21,7 +21,9 @@ from .device_list import DeviceInfo
 from .failures import buffer_bytes, explained
 
 if TYPE_CHECKING:
-    from pyopencl import Buffer as Buffer  # what upload, zeros and empty return, for annotations
+    from pyopencl import Buffer as Buffer  # returned by upload, zeros and empty
+else:
+    Buffer = Any  # in annotations alone: pyopencl is loaded with the first device
 
 # A launch of a struct and 16 buffers takes 33 us of processor time, and 23 us once pyopencl is told the struct's type;
 # one of 17 single numbers took 84 us untold. Telling it takes 0.4 ms, which kernels of few launches do not save.

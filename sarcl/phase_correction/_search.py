@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from . import _phase_gradient
+from . import _phase_gradient, _phase_smoothing
 from ._aperture_view import LAGS, NO_LAG, WINDOW, ApertureView, Errors
 
 log = logging.getLogger(__name__)
@@ -24,6 +24,8 @@ RANGE_MODES = 8  # cosines over the aperture for range errors, or an eighth of t
 # through range cells; where only places on one side see it, as at the edge of a grid, that looks like a range error
 APART = WINDOW
 RANGE_GAIN = 1.015  # least gain in sharpness by which range errors are accepted
+MODES = 4, 8, 16, 32  # cosines over the aperture, in a search for smooth phases
+STEPS = 15  # steps of that search, for each number of cosines
 RANGE_CELLS = 0.05  # least rms of range errors, cells, at which they are tried: smaller ones can hardly be seen
 
 
@@ -148,3 +150,29 @@ def _migrates(view: ApertureView, errors: Errors) -> bool:
     cells = _phase_gradient.range_shift(v, zero, view.window, min(RANGE_MODES, view.n // 8)) / 2
     log.debug("under the phase alone the echoes move by %.3f range cells", abs(cells).max())
     return bool(abs(cells).max() >= MOVED)
+
+
+def curves(v: np.ndarray, free: np.ndarray, width: float) -> list[np.ndarray]:
+    """Phases (n,) of MODES cosines and a slope that sharpen contributions v (n, k).
+
+    In crowded scenes free phases of single pulses make fewer points than there are.
+
+    free   phase (n,) of the same contributions, each pulse by itself, which is a start besides the curve of fewer
+           cosines: a large error is far from no phase at all. The sharper of the two is taken
+    width  Doppler bins about 0, as of `_phase_gradient.sharpen`, whose steps are projected onto the cosines. MODES of
+           half the pulses or more are left out.
+    """
+    phase, phases = np.zeros(len(v)), []
+    for modes in (m for m in MODES if 2 * m < len(v)):
+        ends = [_ascended(v, start, modes, width) for start in (phase, _phase_smoothing.smooth(free, modes))]
+        phase = max(ends, key=lambda end: _phase_gradient.sharpness(v, end, width))
+        phases.append(phase)
+    return phases
+
+
+def _ascended(v: np.ndarray, phase: np.ndarray, modes: int, width: float) -> np.ndarray:
+    """The phase (n,) of so many cosines near `phase` that sharpens contributions v (n, k)."""
+    for _ in range(STEPS):
+        step = _phase_gradient.sharpen(v, phase, width, steps=1) - phase
+        phase = _phase_smoothing.lowest(phase + np.angle(np.exp(1j * step)), modes)
+    return phase

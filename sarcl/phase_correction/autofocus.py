@@ -187,9 +187,7 @@ def _aperture_view(raw: PhaseHistory, rows: np.ndarray, grid: ImageGrid) -> Aper
     if grid.x_axis is not None and grid.y_axis is not None:
         look = look @ np.stack([grid.x_axis, grid.y_axis], axis=1)
     if np.linalg.norm(look) < 1e-9:
-        raise ValueError(
-            "tx and rx are the same in every pulse; without an aperture there is no cross-range image to focus"
-        )
+        raise ValueError("tx and rx are the same in every pulse: without an aperture nothing is focused across range")
     axes = np.linalg.svd(look, full_matrices=False)[2][:2]
     shift_phase = 2 * np.pi * frequency / SPEED_OF_LIGHT * look @ axes.T
     scale = float(np.sqrt(energy.max()))

@@ -16,7 +16,7 @@ import sarcl
 from sarcl.cli.parser import main
 from sarcl.io import _checksums, formats, hdf5, output_paths, sarcl_hdf5
 from sarcl.model import store
-from sarcl.model.phase_history import PER_ROW
+from sarcl.model._row_fields import PER_ROW
 
 DATA = Path(os.environ.get("SARCL_DATA") or Path(__file__).parents[2] / "../shared/data")
 GOTCHA = [DATA / "gotcha" / f"data_3dsar_pass1_az00{n}_HH.mat" for n in (1, 2)]

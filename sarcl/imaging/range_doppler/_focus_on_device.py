@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from ...base.stage_timer import Clock
 from ...numerics.range_profiles import check_digits
 from ...numerics.transforms import Transforms
 from ...numerics.weighted_samples import WeightedSamples, bound_of_held
-from ...opencl.device import Device
+from ...opencl.device import Buffer, Device
 from ...opencl.fft_batches import Batches
 from ...opencl.launch_numbers import launch_numbers
 from ...opencl.pipeline import SLOTS, Pipeline
@@ -27,9 +27,6 @@ from ._bins import Bins
 from ._doppler import EVANESCENT
 from ._host_rows import ARRAYS, Job, referenced, turns
 from ._plan import SEGMENT, FocusPlan
-
-if TYPE_CHECKING:
-    from ...opencl.device import Buffer
 
 LENGTHS = 3  # lengths of FFTs: along the track, of range profiles, back; the programs of each keep their memory
 WORK = 1 / 16  # share of a budget for the rows that are transformed at a time, with one of these lengths

@@ -4,20 +4,16 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...base import float_pairs
 from ...model.image_grid import ImageGrid
 from ...numerics.tiles import Tiles
-from ...opencl.device import Device
+from ...opencl.device import Buffer, Device
 from ...opencl.launch_numbers import launch_numbers
 from .tiling import FlatImage, Orders, Part, Roots, Run, Section, Tiling
 from .tree import Tree
-
-if TYPE_CHECKING:
-    from ...opencl.device import Buffer
 
 
 def _power_of_two(n: int) -> int:

@@ -5,18 +5,15 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from ...model.image_grid import ImageGrid
 from ...numerics.tiles import Tiles
-from ...opencl.device import Device
+from ...opencl.device import Buffer, Device
 from ...opencl.launch_numbers import launch_numbers
 from .tree import Tree
-
-if TYPE_CHECKING:
-    from ...opencl.device import Buffer
 
 Run = tuple[int, int]  # bands first ... last - 1
 Orders = Sequence[np.ndarray | None]  # for each band: cell of the band that each point of its tiles is; None: a plane
