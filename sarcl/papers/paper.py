@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import functools
 import time
+import tomllib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from typing import Any, Concatenate, Literal, ParamSpec
 
 import numpy as np
 
 from ..figures import html
 from ..figures.html import Block, heading, listed, page, table, terms, words
+from . import PAPERS
 
 Basis = Literal["paper", "geometry", "theory"]
 BASES: dict[Basis, str] = {
@@ -61,7 +64,14 @@ class Row:
         return {"published" if name == "expected" and self.basis == "paper" else name: out[name] for name in out}
 
 
+ROW_TEXTS = {"item", "source", "expected", "measured", "why", "rule", "cause", "basis"}
 P = ParamSpec("P")
+
+
+@functools.cache
+def _texts(paper: str) -> dict[str, Any]:
+    """Texts of a paper's page: NAME.toml beside this file."""
+    return tomllib.loads((Path(__file__).parent / f"{paper}.toml").read_text(encoding="utf-8"))
 
 
 def _adding(block: Callable[P, Block]) -> Callable[Concatenate[Section, P], None]:
@@ -76,36 +86,54 @@ def _adding(block: Callable[P, Block]) -> Callable[Concatenate[Section, P], None
 
 @dataclass
 class Section:
-    """A section as it grows: rows, blocks of the page, and numbers for JSON."""
+    """A section as it grows: rows, blocks of the page, and numbers for JSON.
+
+    texts  its paragraphs, and for each item of a row a table of published value, source, criterion and remarks
+    """
 
     key: str
     title: str
+    texts: dict[str, Any] = field(default_factory=dict)
     rows: list[Row] = field(default_factory=list)
     parts: list[Block] = field(default_factory=list)
     numbers: dict[str, Any] = field(default_factory=dict)
     seconds: float = 0.0
 
-    def number(
-        self, item: str, source: str, expected: float, measured: float, within: float, unit: str = "",
-        form: str = ".3f", why: str = "", cause: Cause = "", *, basis: Basis = "paper",
-    ) -> None:  # fmt: skip
-        """A row that holds where `measured` lies within `within` of the expected number."""
-        printed, value = (f"{v:{form}} {unit}".strip() for v in (expected, measured))
-        holds, rule = bool(abs(measured - expected) <= within), f"within {within:.3g} {unit}".strip()
-        cause = "" if holds else cause
-        self.rows.append(Row(item, source, printed, value, holds, why, plain(measured), rule, cause, basis))
+    @classmethod
+    def of(cls, paper: str, key: str, **words: object) -> Section:
+        """A section with the texts of its paper's file; words fill those of its title."""
+        texts = _texts(paper)[key]
+        return cls(key, texts["title"].format(**words), texts)
 
-    def states(
-        self, item: str, source: str, expected: str, measured: str, holds: object, why: str = "", value: object = None,
-        *, rule: str, cause: Cause = "", basis: Basis = "paper",
-    ) -> None:  # fmt: skip
-        """A row for a statement in words. `holds`: whether the measured value agrees, by the criterion `rule`."""
-        cause = "" if holds else cause
-        self.rows.append(Row(item, source, expected, measured, bool(holds), why, plain(value), rule, cause, basis))
+    def number(self, item: str, measured: float, **words: Any) -> None:
+        """A row that holds where `measured` lies `within` so much of the expected number; words: as `states` has them,
+        and form and unit of both numbers."""
+        text = {"unit": "", "form": ".3f", **self.texts.get(item, {}), **words}
+        printed, value = (f"{v:{text['form']}} {text['unit']}".strip() for v in (text["expected"], measured))
+        rule = f"within {text['within']:.3g} {text['unit']}".strip()
+        holds = abs(measured - text["expected"]) <= text["within"]
+        self.states(item, measured, holds, **{**words, "expected": printed, "measured": value, "rule": rule})
 
-    def say(self, text: str) -> None:
-        """A paragraph."""
-        self.parts.append(words(text))
+    def states(self, item: str, value: object, holds: object, **words: Any) -> None:
+        """A row. `holds`: whether the measured value agrees, by the criterion `rule`.
+
+        The texts of the row are those of the item in the paper's file. In {} they name the value and the words; a
+        word that is called as a text stands in its place.
+        """
+        texts = {"item": item, "source": "", **self.texts.get(item, {})}
+        filled = {name: text.format(value=value, **words) for name, text in texts.items() if isinstance(text, str)}
+        row = {name: text for name, text in {**filled, **words}.items() if name in ROW_TEXTS}
+        self.rows.append(
+            Row(**row | {"cause": "" if holds else row.get("cause", "")}, holds=bool(holds), value=plain(value))
+        )
+
+    def say(self, key: str = "text", **words: object) -> None:
+        """A paragraph of the paper's file, with the words in its {}."""
+        self.parts.append(html.words(self.texts[key].format(**words)))
+
+    def list(self, key: str = "errors") -> None:
+        """A list of paragraphs of the paper's file."""
+        self.parts.append(listed(self.texts[key]))
 
     def draw(self, *figures: Block) -> None:
         """Figures."""
@@ -144,6 +172,22 @@ class Paper:
     terms: tuple[tuple[str, str], ...] = ()
     main: tuple[str, ...] = ()
     long: bool = False
+
+    @classmethod
+    def of(
+        cls,
+        name: str,
+        lab: Callable[..., Any],
+        sections: tuple[Callable[[Any], Section], ...],
+        long: bool = False,
+        **words: object,
+    ) -> Paper:
+        """A paper with the texts of its file; words fill that of a quick run."""
+        texts = _texts(name)
+        about, quick = texts["about"].format(source=PAPERS[name]), texts["quick"].format(**words)
+        return cls(
+            name, texts["title"], about, lab, sections, quick, tuple(texts["terms"].items()), tuple(texts["main"]), long
+        )
 
     def run(self, lab: object) -> Iterator[Section]:
         """Its sections, one after the other, timed; lab: as `self.lab` makes it."""

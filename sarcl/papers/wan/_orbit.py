@@ -34,7 +34,7 @@ PULSES, LOOKS, CELL = {True: 900, False: 1400}, {True: 2, False: 8}, 2.5  # m, c
 
 def section(lab: Lab) -> Section:
     """Figures 6 to 8."""
-    out = Section("orbit", "Solids on rough ground, from an orbit to the image (figures 6 to 8)")
+    out = Section.of("wan", "orbit")
     orbit = Orbit.kepler(7.17e6, 1e-3, 1.72, span=(-60.0, 60.0))  # m, rad: 800 km high
     origin = orbit.geolocate(0.0, SLANT, side="right")
     axes = _axes(orbit, origin)
@@ -60,19 +60,12 @@ def section(lab: Lab) -> Section:
             first, drawn = range_doppler(raw, side="right", check=True, **options), scene
     assert first is not None and first.report is not None and first.report.measured_error is not None
     apart = float(first.report.measured_error)
-    item = "range-Doppler image and backprojection of the same echoes"
-    measured = f"differ by {apart:.1e}"
-    rule = "below the tolerance of 1e-2"
-    out.states(item, "figure 8", "the same image", measured, apart < 1e-2, value=apart, rule=rule, basis="theory")
+    out.states("range-Doppler image and backprojection of the same echoes", apart, apart < 1e-2)
     local = (np.asarray(first.grid.positions) - origin) @ axes.T
     _shadow(out, power, grid, float(np.tan(seen.incidence)))
     rate = float(seen.doppler_rate(CHIRP.center))
     out.keep(incidence_deg=float(np.degrees(seen.incidence)), doppler_rate_hz_per_s=rate, range_doppler_error=apart)
-    out.say(
-        f"Kepler orbit about the rotating Earth, 800 km high, {np.degrees(seen.incidence):.0f} deg of incidence, "
-        f"Doppler rate {rate:.0f} Hz/s. Echoes arrive where the satellite is then. The paper gives no sizes; the "
-        f"largest solid is {2 * SCALE * FOOT[0]:.0f} m wide here, because the resolution is 4 m in slant range."
-    )
+    out.say(incidence_deg=np.degrees(seen.incidence), rate=rate, width=2 * SCALE * FOOT[0])
     half = SCALE * SIDES[0], SCALE * SIDES[1]
     out.picture(
         _db(power), (-half[1], half[1]), (-half[0], half[0]), "ground range, m", "azimuth, m",
@@ -120,12 +113,13 @@ def _maps_of_cells(
         )
     alike, unlike = (correlation(image, cells, AVERAGED) for cells in (slant_map, ground_map))
     out.states(
-        "range-Doppler image and the map of the slant plane", "figures 7 and 8", "very close",
-        f"correlation {alike:.2f} of the amplitudes of {AVERAGED} x {AVERAGED} pixels; with the ground's map "
-        f"{unlike:.2f}", alike > max(ALIKE, unlike), value=[alike, unlike],
-        rule=f"correlation above {ALIKE:g} and above that with the ground's map; speckle is averaged over "
-        f"{AVERAGED**2} pixels",
-    )  # fmt: skip
+        "range-Doppler image and the map of the slant plane",
+        [alike, unlike],
+        alike > max(ALIKE, unlike),
+        averaged=AVERAGED,
+        alike=ALIKE,
+        n_averaged=AVERAGED**2,
+    )
 
 
 def _edges(places: np.ndarray) -> np.ndarray:
@@ -171,7 +165,7 @@ def _shadow(out: Section, power: np.ndarray, grid: ImageGrid, tangent: float) ->
     below = profile < lit / 2
     inside = np.flatnonzero(below & (x < end + 30))
     measured_end = float(x[inside[-1]] + grid.spacing[1] / 2)
-    out.number("end of the cylinder's shadow", "figures 7 and 8", end, measured_end, 12.0, "m", ".0f", basis="geometry")
+    out.number("end of the cylinder's shadow", measured_end, expected=end)
     caption = "Profile through the solids: layover in front, shadow behind."
     out.plot([("mean over azimuth", x, 10 * np.log10(profile / lit))], "ground range, m", "dB over the ground", caption)
 

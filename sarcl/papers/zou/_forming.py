@@ -32,24 +32,33 @@ class Comparison:
 
 def section(lab: Lab) -> Section:
     """Figure 8."""
-    out = Section("forming", "Waveform forming and one run of the grid per azimuth (figure 8)")
+    out = Section.of("zou", "forming")
     n, times = len(lab.radar.track), []
     for name in (BRICK, CONE):
         errors = compared(lab, name)
         report, plan = report_of(lab.full_wave(name))
         anchors, one, own = len(plan["anchors"]), *errors.totals
         out.states(
-            f"{name}: one anchor against one run per azimuth", "figure 8" if name == BRICK else "section 4",
-            "the difference is not significant", f"differs by {one:.1%}, by up to {errors.one.max():.0%} at an azimuth",
-            one < FINE, "the beam of table 1 reaches 9.6 degrees to either side, where the currents are not those of "
-            "the middle", one, rule=f"rms over {N_AZIMUTHS} azimuths below {FINE:.0%}", cause="interpretation",
-        )  # fmt: skip
-        item = f"{name}: {anchors} anchors against one run per azimuth"
-        expected = f"at most {TOLERANCE:.0%}"
-        measured = f"differs by {own:.1%}, by up to {errors.own.max():.0%} at an azimuth"
-        why = f"predicted from the anchors alone: {report.predicted_error:.1%}"
-        rule = f"rms over {N_AZIMUTHS} azimuths off the anchors below {TOLERANCE:.0%}"
-        out.states(item, "tolerance", expected, measured, own < TOLERANCE, why, own, rule=rule, basis="theory")
+            "{name}: one anchor against one run per azimuth",
+            one,
+            one < FINE,
+            source="figure 8" if name == BRICK else "section 4",
+            name=name,
+            worst=errors.one.max(),
+            n_azimuths=N_AZIMUTHS,
+            fine=FINE,
+        )
+        out.states(
+            "{name}: {anchors} anchors against one run per azimuth",
+            own,
+            own < TOLERANCE,
+            name=name,
+            anchors=anchors,
+            worst=errors.own.max(),
+            tolerance=TOLERANCE,
+            n_azimuths=N_AZIMUTHS,
+            predicted=report.predicted_error,
+        )
         degrees = np.degrees(errors.angle)
         out.plot(
             [

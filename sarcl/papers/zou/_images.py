@@ -34,7 +34,8 @@ LEAST = 1e-7  # of the amplitude in HH that float32 resolves: VH is not below
 def section(name: str, lab: Lab) -> Section:
     """A target of figures 5 to 7."""
     target = _targets.find(name)
-    out = Section(name, f"Figures 5 to 7 ({target.letter}): {target.name}, {target.printed}")
+    out = Section.of("zou", "images", target=target)
+    out.key = name
     both = lab.full_wave(name)
     raws = {polarization: both.select(polarization=polarization) for polarization in BOTH}
     for polarization, raw in raws.items():
@@ -98,12 +99,15 @@ def _say(out: Section, found: Levels, both: PhaseHistory) -> None:
     report, grid = report_of(both)
     model = report.model_error
     out.say(
-        f"Brightest pixel in HH {20 * np.log10(found.peak[0]):.1f} dB re 1 m², by physical optics "
-        f"{20 * np.log10(found.optics):.1f}; the echoes of physical optics differ from those of full wave by "
-        f"{found.apart:.0%} of their root mean square. Brightest pixel in VH {cross:.0f} dB of that in HH. Physical "
-        f"optics of a perfect conductor sends back no VH. Grid of {grid['grid']} cells of {1e3 * grid['cell_m']:.3g} "
-        f"mm, {grid['cells']:.1f} per shortest wavelength; error of waveform forming {report.predicted_error:.1%}, of "
-        f"the grid {model or 0:.0%}, both predicted."
+        peak_db=20 * np.log10(found.peak[0]),
+        optics_db=20 * np.log10(found.optics),
+        apart=found.apart,
+        cross=cross,
+        cells=grid["grid"],
+        cell_mm=1e3 * grid["cell_m"],
+        per_wavelength=grid["cells"],
+        predicted=report.predicted_error,
+        model_error=model or 0,
     )
     out.keep(
         peak_hh_dbsm=20 * np.log10(found.peak[0]), cross_over_co_db=cross, rms_hh=found.rms[0], rms_vh=found.rms[1],
@@ -149,11 +153,7 @@ def _compare_chain(out: Section, view: _View, name: str, image: Image, raw: Phas
     exact = view.backprojected(raw, image.grid)
     chain = np.asarray(image.data) / image.gain
     apart = float(np.linalg.norm(chain - exact) / np.linalg.norm(exact))
-    item = f"{name}: range-Doppler image of 600 MHz samples"
-    expected = "the image of the echoes"
-    measured = f"differs by {apart:.1%} from backprojection of the echoes"
-    rule = f"below {CHAIN:.0%}"
-    out.states(item, "figures 6 and 7", expected, measured, apart < CHAIN, value=apart, rule=rule, basis="theory")
+    out.states("{name}: range-Doppler image of 600 MHz samples", apart, apart < CHAIN, name=name, chain=CHAIN)
 
 
 def _outline(lab: Lab, name: str) -> list[tuple[str, Any, Any]]:
