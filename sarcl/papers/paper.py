@@ -7,7 +7,7 @@ import time
 import tomllib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
-from pathlib import Path
+from pkgutil import get_data
 from typing import Any, Concatenate, Literal, ParamSpec
 
 import numpy as np
@@ -71,7 +71,7 @@ P = ParamSpec("P")
 @functools.cache
 def _texts(paper: str) -> dict[str, Any]:
     """Texts of a paper's page: NAME.toml beside this file."""
-    return tomllib.loads((Path(__file__).parent / f"{paper}.toml").read_text(encoding="utf-8"))
+    return tomllib.loads((get_data(__package__, f"{paper}.toml") or b"").decode())
 
 
 def _adding(block: Callable[P, Block]) -> Callable[Concatenate[Section, P], None]:
