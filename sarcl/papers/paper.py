@@ -5,17 +5,19 @@ from __future__ import annotations
 import functools
 import time
 import tomllib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pkgutil import get_data
-from typing import Any, Concatenate, Literal, ParamSpec
+from typing import Any, Literal
 
 import numpy as np
 
 from ..figures import html
 from ..figures.html import Block, heading, listed, page, table, terms, words
+from ..figures.plots import Curve
 from . import PAPERS
 
+Ends = tuple[float, float]
 Basis = Literal["paper", "geometry", "theory"]
 BASES: dict[Basis, str] = {
     "paper": "printed in the paper",
@@ -65,23 +67,12 @@ class Row:
 
 
 ROW_TEXTS = {"item", "source", "expected", "measured", "why", "rule", "cause", "basis"}
-P = ParamSpec("P")
 
 
 @functools.cache
 def _texts(paper: str) -> dict[str, Any]:
     """Texts of a paper's page: NAME.toml beside this file."""
     return tomllib.loads((get_data(__package__, f"{paper}.toml") or b"").decode())
-
-
-def _adding(block: Callable[P, Block]) -> Callable[Concatenate[Section, P], None]:
-    """A method that adds a block to a section, with the arguments of the function that makes the block."""
-
-    @functools.wraps(block)
-    def add(section: Section, /, *args: P.args, **options: P.kwargs) -> None:
-        section.parts.append(block(*args, **options))
-
-    return add
 
 
 @dataclass
@@ -139,7 +130,35 @@ class Section:
         """Figures."""
         self.parts += figures
 
-    plot, picture, table = _adding(html.plot), _adding(html.picture), _adding(html.table)
+    def _figure(self, key: str, words: Mapping[str, object]) -> dict[str, Any]:
+        """Texts of a figure or table of the paper's file: names of axes or a head, and a caption."""
+        texts = {"caption": "", **self.texts["figures"][key]}
+        head = [text.format(**words) for text in texts.pop("head", [])]
+        return {name: text.format(**words) for name, text in texts.items()} | {"head": head}
+
+    def plot(
+        self,
+        key: str,
+        curves: Sequence[Curve],
+        dots: bool | Sequence[str] = False,
+        log_x: bool = False,
+        **words: object,
+    ) -> None:
+        """A figure of curves; words fill its texts."""
+        texts = self._figure(key, words)
+        self.parts.append(html.plot(curves, texts["x"], texts["y"], texts["caption"], dots=dots, log_x=log_x))
+
+    def picture(
+        self, key: str, values: np.ndarray, x: Ends, y: Ends, words: Mapping[str, object] | None = None, **look: Any
+    ) -> None:
+        """A figure of values between the ends of x and y, in grey; words fill its texts."""
+        texts = self._figure(key, words or {})
+        self.parts.append(html.picture(values, x, y, texts["x"], texts["y"], texts["caption"], **look))
+
+    def table(self, key: str, rows: Sequence[Sequence[Any]], text: bool = False, **words: object) -> None:
+        """A table; words fill its texts."""
+        texts = self._figure(key, words)
+        self.parts.append(table(texts["head"], rows, texts["caption"], text=text))
 
     def keep(self, **numbers: object) -> None:
         """Numbers behind the figures, six digits of each."""

@@ -447,24 +447,42 @@ def test_arrays_of_more_than_a_hundred_elements(tmp_path):
     assert large["finished"] and not large["quick"]
 
 
-@pytest.mark.parametrize("name", papers.PAPERS)
-def test_every_row_finds_its_texts_and_the_words_in_them(name):
-    texts = tomllib.loads((Path(papers.__file__).parent / f"{name}.toml").read_text(encoding="utf-8"))
-    tables = {item: row for section in texts.values() if isinstance(section, dict)
-              for item, row in section.items() if isinstance(row, dict)}  # fmt: skip
-    rows = set()
+def fields_of(texts):
+    """Names in the {} of texts."""
+    return {re.split(r"[.\[]", field)[0] for text in texts for _, field, *_ in Formatter().parse(text) if field}
+
+
+def calls(name, *methods):
+    """Calls of methods of a section in the modules of a paper: first argument, names of the others."""
     for file in (Path(papers.__file__).parent / name).glob("*.py"):
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.Call) and ast.unparse(node.func) in ("out.states", "out.number"):
-                item, words = ast.unparse(node.args[0]).strip("'\""), {word.arg for word in node.keywords}
-                if item not in tables:
-                    assert item == "item"  # of a loop
-                    continue
-                rows.add(item)
-                filled = [text for key, text in {"item": item, **tables[item]}.items()
-                          if isinstance(text, str) and key not in words]  # fmt: skip
-                fields = {
-                    re.split(r"[.\[]", field)[0] for text in filled for _, field, *_ in Formatter().parse(text) if field
-                }
-                assert None in words or fields - {"value"} <= words, (file.name, item, fields - words)
-    assert len(set(tables) - rows) <= 4  # items of loops
+            if isinstance(node, ast.Call) and ast.unparse(node.func) in methods:
+                words = {word.arg for word in node.keywords}
+                for word in node.keywords:
+                    if word.arg == "words":
+                        words |= {key.value for key in word.value.keys}
+                yield node.args[0], words
+
+
+@pytest.mark.parametrize("name", papers.PAPERS)
+def test_every_row_and_figure_finds_its_texts_and_the_words_in_them(name):
+    texts = tomllib.loads((Path(papers.__file__).parent / f"{name}.toml").read_text(encoding="utf-8"))
+    sections = [table for key, table in texts.items() if isinstance(table, dict) and key != "terms"]
+    rows = {key: row for table in sections for key, row in table.items() if isinstance(row, dict) and key != "figures"}
+    unused = set(rows)
+    for node, words in calls(name, "out.states", "out.number"):
+        if not isinstance(node, ast.Constant):  # items of loops
+            continue
+        entry = {"item": node.value, **rows[node.value]}
+        filled = [text for key, text in entry.items() if isinstance(text, str) and key not in words]
+        assert None in words or fields_of(filled) - {"value"} <= words, node.value
+        unused.discard(node.value)
+    assert len(unused) <= 4  # items of loops
+    figures = [{k: f for k, f in table.get("figures", {}).items()} for table in sections]
+    for node, words in calls(name, "out.plot", "out.picture", "out.table"):
+        if isinstance(node, ast.Constant):
+            found = [table[node.value] for table in figures if node.value in table]
+            assert found
+            assert any(
+                fields_of([*f.get("head", []), *(f.get(k, "") for k in ("x", "y", "caption"))]) <= words for f in found
+            )

@@ -63,7 +63,7 @@ def steady(lab: Lab) -> Section:
             lab.picture(lab.mapped(case, "apparent", DIAMOND), f"{name}, mapped (figure {figure})."),
             lab.picture(mapped, f"{name}: the centre point in a box of 0.167 m (figure {figure}).", ZOOM, PRINTED),
         )
-    out.plot(curves, "actual position, m", "position backprojected from, m", "Positions along the track.", dots=True)
+    out.plot("Positions along the track", curves, dots=True)
     return out
 
 
@@ -109,9 +109,8 @@ def switched(lab: Lab) -> Section:
                 mapped["published"], f"{name}: the centre point in a box of 0.167 m ({figure}).", ZOOM, PRINTED
             ),
         )
-    head = ["length, m", "printed", "d 14.36 mm", "d 15 mm", "offset halved"]
-    out.table(head, table)
-    out.plot(curves, "actual position, m", "position backprojected from, m", "Positions along the track.", dots=True)
+    out.table("Lengths of the apertures", table)
+    out.plot("Positions along the track", curves, dots=True)
     return out
 
 
@@ -148,7 +147,7 @@ def nulls(lab: Lab) -> Section:
     places, values = lab.cut(lab.mapped(plain, "corrected"), half=1.0, n=401)
     curves.insert(0, ("not mapped", places, decibels(values)))
     out.say()
-    out.plot(curves, "cross-range, m", "dB", "The centre point (figures 5.6 to 5.8).")
+    out.plot("The centre point", curves)
     return out
 
 

@@ -45,9 +45,8 @@ def _poles(out: Section) -> None:
     worst = float(np.nanmax(printed))
     out.states("largest array factor, over N P", worst, worst < 1.01, corrected=right.max())
     for what, level in (("corrected", right), ("as printed, limited to 1", np.minimum(printed, 1.0))):
-        caption = f"Equation 4.1 {what}, t' = -250 us."
         out.picture(
-            decibels(level, -80), (-85.1, 84.9), (-85.1, 84.9), "azimuth, deg", "elevation, deg", caption, floor_db=-40
+            "Equation 4.1", decibels(level, -80), (-85.1, 84.9), (-85.1, 84.9), floor_db=-40, words={"what": what}
         )
 
 
@@ -69,8 +68,4 @@ def _mirror(out: Section, lab: Lab) -> None:
     off = [float(np.abs(y - mapped[:, 1]).max()) for y in (printed, mended)]
     out.states("places along the track, N 45, 20 MHz", off, off[0] < 1.0, mended_mm=1e3 * off[1])
     curves = [("actual", actual[:, 1]), ("as printed", printed), ("corrected", mended)]
-    y_name = "position backprojected from, m"
-    caption = "Equation 5.14 as printed and corrected, N 45, 20 MHz."
-    out.plot(
-        [(name, actual[::THIN, 1], y[::THIN]) for name, y in curves], "actual position, m", y_name, caption, dots=True
-    )
+    out.plot("Equation 5.14", [(name, actual[::THIN, 1], y[::THIN]) for name, y in curves], dots=True)

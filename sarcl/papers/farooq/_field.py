@@ -45,8 +45,8 @@ def delays(lab: Lab) -> Section:
     bound = closed.quadratic_phase(shape=(N, 1), spacing=(HALF_WAVE, 0), frequency_step=(STEP, 0), cosines=(1, 0))
     out.states("the same in the exact field: a peak at +45 deg", peak, peak > 0.9 * N, n=N, ratio=bound / (np.pi / 4))
     _systems(out, lab)
-    out.plot(curves, "t', ns", "modulus", "Closed form in three directions (figures 4.10 to 4.12).")
-    out.plot(exact_curves, "t', ns", "modulus", "The exact field in the same directions.")
+    out.plot("Closed form in three directions", curves)
+    out.plot("The exact field in the same directions", exact_curves)
     return out
 
 
@@ -77,8 +77,7 @@ def _systems(out: Section, lab: Lab) -> None:
         )
         rows.append([f"N {n}, {step / 1e6:g} MHz", f"{delay / plain:.4f}", f"{predicted / plain:.4f}",
                      f"{1e3 * offset:.0f}", f"{modulus.max() / n:.4f}"])  # fmt: skip
-    head = ["215 m along, 5 km away", "delay over (4.27)", "f0 + (N - 1) df", "range, mm", "peak over N"]
-    out.table(head, rows)
+    out.table("Delays of the systems", rows)
 
 
 def snapshots(lab: Lab) -> Section:
@@ -96,16 +95,14 @@ def snapshots(lab: Lab) -> Section:
         retarded = t - distance / SPEED_OF_LIGHT
         gate = np.abs(retarded) <= 0.5 / STEP
         exact = np.abs(beam(array, F0, times=t, positions=place, device=lab.device)) * gate
-        y_name = f"Exact field, {ns} ns after the pulse left."
-        out.picture(decibels(exact / N, -60), *edges, "cross-range, m", "range, m", y_name, floor_db=-15)
+        out.picture("Exact field", decibels(exact / N, -60), *edges, floor_db=-15, words={"ns": ns})
         if ns == 2:
             level = np.abs(
                 closed.waveform(F0, N, spacing=-HALF_WAVE, frequency_step=STEP, azimuth=azimuth, retarded=retarded)
             )
             late = out.parts.pop()
             out.draw(late)
-            y_name = "Closed form, 2 ns: what figure 4.9 shows."
-            out.picture(decibels(level * gate / N, -60), *edges, "cross-range, m", "range, m", y_name, floor_db=-15)
+            out.picture("Closed form", decibels(level * gate / N, -60), *edges, floor_db=-15)
             _orders(out, level * gate, distance, azimuth)
             _normals(out, decibels(level * gate / N, -60), edges)
     return out
@@ -128,8 +125,7 @@ def _normals(out: Section, level: np.ndarray, edges: tuple[tuple[float, float], 
         (name, [at[1], at[1] + 0.4 * d[1]], [at[0], at[0] + 0.4 * d[0]])
         for name, d in (("normal of uniform phase", radial), ("normal of uniform amplitude", across))
     ]
-    y_name = "Closed form, 2 ns, with two normals at 30 deg (figure 4.13)."
-    out.picture(level, *edges, "cross-range, m", "range, m", y_name, floor_db=-15, lines=rays)
+    out.picture("Closed form normals", level, *edges, floor_db=-15, lines=rays)
 
 
 def _orders(out: Section, level: np.ndarray, distance: np.ndarray, azimuth: np.ndarray) -> None:

@@ -70,11 +70,8 @@ def section(lab: Lab) -> Section:
             places, values = lab.cut(lab.mapped(case, "corrected", quadratic=quadratic), half=0.8, n=321)
             curves.append((f"{name}, {label}", places, values))
     out.say()
-    out.table(
-        ["", "unmodified peak, dB", "quadratic phase, rad", "linear: null, m", "peak, dB", "PSLR, dB", "all: null, m",
-         "PSLR, dB"], table,
-    )  # fmt: skip
+    out.table("Unmodified, linear and all", table)
     out.draw(lab.picture(lab.mapped(first, None, DIAMOND), "Unmodified backprojection, N 45, 20 MHz (figure 5.1)."))
     out.draw(lab.picture(lab.mapped(first, "corrected", DIAMOND), "Delay and phase corrected (figure 5.2)."))
-    out.plot(curves, "cross-range, m", "modulus", "The centre point, with and without the quadratic phase.")
+    out.plot("The centre point", curves)
     return out

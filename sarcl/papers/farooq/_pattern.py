@@ -148,7 +148,7 @@ def errors(lab: Lab) -> Section:
         shape=SHAPE, spacing=(0.015, 0.015), frequency_step=(150e6, 0), cosines=(np.sin(np.pi / 4), 0)
     )
     out.number("quadratic phase of scenario B at 45 deg", steep / (np.pi / 4))
-    out.plot(curves, "azimuth, deg", "difference", "Difference of the patterns (figure 3.14).")
+    out.plot("Difference of the patterns", curves)
     return out
 
 

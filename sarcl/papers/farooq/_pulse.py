@@ -49,14 +49,13 @@ def waveform(lab: Lab) -> Section:
     out.states("neighbouring channels cross", crossing, crossing < -3)
     out.say()
     shown = (f >= 7e9) & (f <= 21e9)
-    out.plot([("1 GHz", 1e9 * t, field[:, 0].real)], "t', ns", "field", "The wave, real part (figure 4.2).")
-    caption = "Its modulus (figure 4.3), and with steps of 1 kHz (figure 4.1)."
-    out.plot([("1 GHz", 1e9 * t, level), ("1 kHz", 1e9 * t, flat[:, 0])], "t', ns", "modulus", caption)
-    out.plot([(f"{(F0 + i * STEP) / 1e9:g} GHz", f[shown] / 1e9, decibels(c[shown]))
-               for i, c in enumerate(channels)],
-              "frequency, GHz", "dB", "Spectra of the channels (figure 4.4).")  # fmt: skip
-    caption = "Spectrum of the pulse (figure 4.5)."
-    out.plot([("sum", f[shown] / 1e9, decibels(total[shown] / total.max()))], "frequency, GHz", "dB", caption)
+    out.plot("The wave", [("1 GHz", 1e9 * t, field[:, 0].real)])
+    out.plot("Its modulus", [("1 GHz", 1e9 * t, level), ("1 kHz", 1e9 * t, flat[:, 0])])
+    out.plot(
+        "Spectra of the channels",
+        [(f"{(F0 + i * STEP) / 1e9:g} GHz", f[shown] / 1e9, decibels(c[shown])) for i, c in enumerate(channels)],
+    )
+    out.plot("Spectrum of the pulse", [("sum", f[shown] / 1e9, decibels(total[shown] / total.max()))])
     out.keep(modulus={"ns": 1e9 * t[::20], "modulus": level[::20]})
     return out
 
@@ -96,13 +95,14 @@ def ambiguities(lab: Lab) -> Section:
     out.say()
     for name, a, figure in (("LFM", chirp, "4.6"), ("FDA", tones, "4.7")):
         out.picture(
-            decibels(a.magnitude.T, -80), (1e9 * a.delays[0], 1e9 * a.delays[-1]),
-            (a.dopplers[0] / 1e9, a.dopplers[-1] / 1e9), "delay, ns", "Doppler, GHz",
-            f"{name}: modulus of the ambiguity function (figure {figure}).", floor_db=-30,
-        )  # fmt: skip
-    out.plot(
-        [(name, 1e9 * tones.delays, c) for name, c in cuts], "delay, ns", "modulus", "Without Doppler (figure 4.8)."
-    )
+            "Modulus of the ambiguity function",
+            decibels(a.magnitude.T, -80),
+            (1e9 * a.delays[0], 1e9 * a.delays[-1]),
+            (a.dopplers[0] / 1e9, a.dopplers[-1] / 1e9),
+            floor_db=-30,
+            words={"name": name, "figure": figure},
+        )
+    out.plot("Without Doppler", [(name, 1e9 * tones.delays, c) for name, c in cuts])
     return out
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...figures import html
 from ..paper import Section
 from ._lab import Lab, decibels, system
 from ._reference import PRINTED
@@ -38,18 +39,12 @@ def trends(lab: Lab) -> Section:
         out.states("PSLR from 10 to 1 MHz", rise, rise[1] > 2 * rise[0])
     out.say()
     steps = [s / 1e6 for s in results]
-    out.table(
-        ["df, MHz", *(f"{s:g}" for s in steps)],
-        [
-            ["nulls, m", *(f"{null:.3f}" for null, _ in results.values())],
-            ["PSLR, dB", *(f"{pslr:.1f}" for _, pslr in results.values())],
-        ],
-    )
-    out.plot(curves, "cross-range, m", "dB", "The centre point (figure 5.9).")
-    out.plot([("null", steps, [null / PRINTED for null, _ in results.values()])], "df, MHz", "of 0.167 m",
-              "First null (figure 5.10).", log_x=True)  # fmt: skip
-    caption = "Highest side lobe (figure 5.11)."
-    out.plot([("PSLR", steps, [pslr for _, pslr in results.values()])], "df, MHz", "dB", caption, log_x=True)
+    nulls, lobes = zip(*results.values(), strict=True)
+    rows = [["nulls, m", *(f"{null:.3f}" for null in nulls)], ["PSLR, dB", *(f"{pslr:.1f}" for pslr in lobes)]]
+    out.draw(html.table(["df, MHz", *(f"{s:g}" for s in steps)], rows))
+    out.plot("The centre point", curves)
+    out.plot("First null", [("null", steps, [null / PRINTED for null, _ in results.values()])], log_x=True)
+    out.plot("Highest side lobe", [("PSLR", steps, [pslr for _, pslr in results.values()])], log_x=True)
     out.keep(df_mhz=steps, null=[f[0] for f in results.values()], pslr_db=[f[1] for f in results.values()])
     return out
 
@@ -82,10 +77,8 @@ def abstract(lab: Lab) -> Section:
         )
         out.states("cross-range resolution, by the same system's nulls", gains[two], abs(gains[two] - 4.5) < 0.1)
     out.say()
-    out.table(["df", "apparent length, m", "longer, %", "time saved, %", "length, dB", "null, m", "nulls, dB"], table)
+    out.table("Gains by frequency step", table)
     x = [s / 1e6 for s in steps]
-    out.plot(
-        [("by length", x, lengths), ("by nulls", x, gains)], "df, MHz", "dB", "Gain over 430 m and 0.167 m.", log_x=True
-    )
+    out.plot("Gains", [("by length", x, lengths), ("by nulls", x, gains)], log_x=True)
     out.keep(df_mhz=x, length_db=lengths, nulls_db=gains)
     return out

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...figures import html
 from ...imaging.backproject import backproject
 from ...model.image_grid import ImageGrid
 from ...model.phase_history import PhaseHistory
@@ -33,14 +34,10 @@ def section(lab: Lab) -> Section:
         levels = matrix(system, lab.device)
         title = f"{name[0].upper()}{name[1:]}"
         out.say("levels", title=title)
-        out.table(
-            ["", *(f"image of zone {q}" for q in range(ZONES))],
-            [[f"point of zone {p}", *(f"{round(v, 1) + 0.0:.1f}" for v in row)] for p, row in enumerate(levels)],
-        )
+        rows = [[f"point of zone {p}", *(f"{round(v, 1) + 0.0:.1f}" for v in row)] for p, row in enumerate(levels)]
+        out.draw(html.table(["", *(f"image of zone {q}" for q in range(ZONES))], rows))
         curves = [(f"zone {q}", places, decibels(c, FLOOR)) for q, c in enumerate(cuts)]
-        out.plot(
-            curves, "behind the zone's centre, m", "dB", f"{title}: images of the four zones, from one record. Hamming."
-        )
+        out.plot("Images of the four zones", curves, title=title)
         off = levels[~np.eye(ZONES, dtype=bool)]
         out.keep(**{name: {"levels_db": levels, "best_other_db": off.min(), "worst_other_db": off.max()}})
     _sweeps(out, radar, lab)
@@ -95,13 +92,8 @@ def _sweeps(out: Section, radar: RangeZones, lab: Lab) -> None:
         clear = np.array(same) > FLOOR
         error = float(np.abs(np.array(measured) - same)[clear].max())
         out.keep(**{name: {"at": x, "measured_db": measured, "predicted_db": same, "largest_error_db": error}})
-        out.plot(
-            [("predicted", xs, np.maximum(predicted, FLOOR)), ("measured", x, np.maximum(measured, FLOOR))],
-            axis,
-            "dB",
-            f"The next zone's point in zone 0's image, against {name}; largest difference {error:.2f} dB.",
-            dots=("measured",),
-        )
+        curves = [("predicted", xs, np.maximum(predicted, FLOOR)), ("measured", x, np.maximum(measured, FLOOR))]
+        out.plot("Isolation of the next zone", curves, dots=("measured",), axis=axis, name=name, error=error)
 
 
 def _image(

@@ -89,12 +89,11 @@ def section(lab: Lab) -> Section:
         bins, density = histogram(amplitude / np.sqrt((amplitude**2).mean()), 3.0, 16)
         out.draw(picture(clean, grid, f"Figure 12 {name}: {case.words}. Hamming window.", -25.0))
         out.plot(
+            "Grey levels of the lower left patch",
             [(f"case {name}", bins, density), ("Rayleigh", bins, rayleigh(bins))],
-            "amplitude over its root mean square",
-            "density",
-            f"Grey levels of the lower left patch in case {name} (histogram of figure 12 {name}), "
-            f"{len(amplitude)} pixels, without a window.",
             dots=[f"case {name}"],
+            name=name,
+            n=len(amplitude),
         )
     out.say()
     _brightness(out, mean, reflected)

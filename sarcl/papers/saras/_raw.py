@@ -100,11 +100,14 @@ def _show_raw(out: Section, raw: PhaseHistory, window: float) -> None:
     real = signal.real[np.ix_(rows, columns)] / np.abs(signal).max()
     top = float(np.percentile(np.abs(real), 99))
     out.picture(
-        np.clip(real, -top, top), _edges(ranges[columns]), _edges(azimuth[rows]),
-        "slant range from the middle, m", "azimuth of the antenna, m",
-        "Real part of the raw signal, before range compression (figure 9).", floor_db=-2 * top,
-        unit="of the largest modulus", equal=True,
-    )  # fmt: skip
+        "Real part of the raw signal",
+        np.clip(real, -top, top),
+        _edges(ranges[columns]),
+        _edges(azimuth[rows]),
+        floor_db=-2 * top,
+        unit="of the largest modulus",
+        equal=True,
+    )
 
 
 def _show_image(out: Section, lab: Lab, raw: PhaseHistory, track: Trajectory) -> None:
@@ -129,11 +132,14 @@ def _show_image(out: Section, lab: Lab, raw: PhaseHistory, track: Trajectory) ->
         within=1.5 * cell,
     )
     out.picture(
-        10 * np.log10(np.maximum(power / np.median(power), 1e-9)), _edges(ranges), _edges(azimuth),
-        "slant range from the middle, m", "azimuth, m",
-        "Range-Doppler image of this raw signal, relative to the median (figure 10).", floor_db=-30.0,
-        percentile=99.5, equal=True,
-    )  # fmt: skip
+        "Range-Doppler image of this raw signal",
+        10 * np.log10(np.maximum(power / np.median(power), 1e-9)),
+        _edges(ranges),
+        _edges(azimuth),
+        floor_db=-30.0,
+        percentile=99.5,
+        equal=True,
+    )
 
 
 def _edges(middles: np.ndarray) -> tuple[float, float]:
@@ -179,13 +185,7 @@ def times(lab: Lab) -> Section:
         )
         out.keep(**{f"{square} facets per pixel: seconds and errors": results})
         worst = max(worst, results[1], results[3])
-    caption = (
-        "Seconds on the device of this run, scene included, and the measured error against the exact sum (random "
-        "samples of the raw signal, recomputed in double precision facet by facet)."
-    )
-    out.table(
-        ["facets per pixel", "VAX, 512 x 512, s", "Fourier transforms, s", "error", "sum, s", "error"], rows, caption
-    )
+    out.table("Seconds on the device of this run", rows)
     out.states("largest error of the timed raw signals", worst, worst <= RAW_TOLERANCE, raw_tolerance=RAW_TOLERANCE)
     out.say()
     return out

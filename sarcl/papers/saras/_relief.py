@@ -77,13 +77,7 @@ def _edges(
             near = places < front + 3
             start = crossings(profile[near], places[near], (before + over) / 2)[1]
             out.number("layover begins", start, expected=front, within=FINE.null[1])
-            out.plot(
-                [("mean over azimuth", places, 10 * np.log10(profile / lit))],
-                "ground range, m",
-                "dB over the ground",
-                "Profile across the parallelepiped, mean over azimuth: layover, then shadow, which the side lobes of a "
-                "Hamming window fill to about -33 dB.",
-            )
+            out.plot("Profile across the parallelepiped", [("mean over azimuth", places, 10 * np.log10(profile / lit))])
     out.say(depth=2 * depth, width=2 * width, height=height, look_deg=np.degrees(FINE.look))
 
 

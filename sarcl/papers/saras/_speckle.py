@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import brentq
 
+from ...figures import html
 from ...model.image_grid import ImageGrid
 from ...model.phase_history import PhaseHistory
 from ...scene.scene import Scene
@@ -44,10 +45,8 @@ def section(lab: Lab) -> Section:
     amplitude = np.abs(pixels.ravel()) / np.sqrt((np.abs(pixels) ** 2).mean())
     levels, density = histogram(amplitude, 3.0)
     out.draw(picture(np.abs(image) ** 2, shown, "Flat homogeneous ground (figure 5)."))
-    x_name = "amplitude over its root mean square"
-    caption = "Grey levels of the image (figure 6)."
     out.plot(
-        [("image", levels, density), ("Rayleigh", levels, rayleigh(levels))], x_name, "density", caption, dots=["image"]
+        "Grey levels of the image", [("image", levels, density), ("Rayleigh", levels, rayleigh(levels))], dots=["image"]
     )
     _correlations(out, lab, radar, raw, n)
     return out
@@ -106,9 +105,8 @@ def _correlations(out: Section, lab: Lab, radar: FarRadar, raw: PhaseHistory, n:
         n_range=shape[1],
     )
     rows = [[str(i), *(f"{a:.2f} / {b:.2f}" for a, b in zip(TABLE[i], table[i], strict=True))] for i in range(5)]
-    out.table(
-        ["range lag", *(f"azimuth lag {i}" for i in range(5))], rows, "Table I: printed / measured autocorrelation."
-    )
+    head = ["range lag", *(f"azimuth lag {i}" for i in range(5))]
+    out.draw(html.table(head, rows, "Table I: printed / measured autocorrelation."))
     grid = radar.grid((n[0] - 8, FINE * (n[1] - 8)), (1, FINE))
     fine = radar.focus(raw, grid, device=lab.device)
     lags = np.arange(4 * FINE + 1)
@@ -119,10 +117,8 @@ def _correlations(out: Section, lab: Lab, radar: FarRadar, raw: PhaseHistory, n:
     off = float(np.abs(curve - response).max())
     out.states("autocorrelation along range and the response of a point", off, off < 0.05)
     out.plot(
+        "Range section of the image's autocorrelation",
         [("autocorrelation of the image", lags / FINE, curve), ("response of a point", lags / FINE, response)],
-        "distance in range, nulls",
-        "modulus",
-        "Range section of the image's autocorrelation (figure 7).",
     )
     out.keep(table=table, pixel_in_nulls=size, curve=curve, response=response)
 

@@ -29,6 +29,7 @@ SLANT, PRF = 1.05e6, 1700.0  # m: 45 deg of incidence; Hz
 SCALE = 8.0  # of the solids; the paper gives no sizes
 FOOT, CUBOID, TOP = (18.0, 12.0, 4.0), (14.0, 14.0, 6.0), (5.0, 6.0)  # radii and height; sides; radius and height
 SIDES = (34.0, 50.0)  # half the ground along azimuth and range
+LOOK: dict[str, Any] = {"floor_db": -30.0, "percentile": 99.5, "equal": True}  # of pictures
 PULSES, LOOKS, CELL = {True: 900, False: 1400}, {True: 2, False: 8}, 2.5  # m, cells of the ground
 
 
@@ -68,19 +69,19 @@ def section(lab: Lab) -> Section:
     out.say(incidence_deg=np.degrees(seen.incidence), rate=rate, width=2 * SCALE * FOOT[0])
     half = SCALE * SIDES[0], SCALE * SIDES[1]
     out.picture(
-        _db(power), (-half[1], half[1]), (-half[0], half[0]), "ground range, m", "azimuth, m",
-        f"Backprojected on the ground: mean of {LOOKS[lab.quick]} looks (figure 6).", floor_db=-30.0,
-        percentile=99.5, equal=True,
-    )  # fmt: skip
+        "Backprojected on the ground",
+        _db(power),
+        (-half[1], half[1]),
+        (-half[0], half[0]),
+        **LOOK,
+        words={"looks": LOOKS[lab.quick]},
+    )
     rows = np.abs(local[:, local.shape[1] // 2, 1]) < half[0]
     columns = np.abs(local[local.shape[0] // 2, :, 0]) < half[1]
     image = np.abs(np.asarray(first.data)[rows][:, columns]) ** 2
     along, across = local[rows, local.shape[1] // 2, 1], local[local.shape[0] // 2, columns, 0]
     _maps_of_cells(out, lab, orbit, axes, origin, drawn, image, (along, across))
-    out.picture(
-        _db(image), (across[0], across[-1]), (along[0], along[-1]), "ground range of the slant range, m", "azimuth, m",
-        "Range-Doppler image, one look (figure 8).", floor_db=-30.0, percentile=99.5, equal=True,
-    )  # fmt: skip
+    out.picture("Range-Doppler image", _db(image), (across[0], across[-1]), (along[0], along[-1]), **LOOK)
     return out
 
 
@@ -103,14 +104,8 @@ def _maps_of_cells(
     along, across = ((middles - origin) @ axes[i] for i in (1, 0))
     ground_map = summed(power, along, across, (_edges(ground_places[0]), _edges(ground_places[1])))
     ends = [(float(places[0]), float(places[-1])) for places in ground_places]
-    for cells, plane, name in (
-        (ground_map, "on the ground", "ground range, m"),
-        (slant_map, "in the slant plane: foreshortening and layover", "ground range of the slant range, m"),
-    ):
-        caption = f"Power of the facets in cells {plane} (figure 7)."
-        out.picture(
-            _db(cells), ends[1], ends[0], name, "azimuth, m", caption, floor_db=-30.0, percentile=99.5, equal=True
-        )
+    for key, cells in (("on the ground", ground_map), ("in the slant plane", slant_map)):
+        out.picture(f"Power of the facets in cells {key}", _db(cells), ends[1], ends[0], **LOOK)
     alike, unlike = (correlation(image, cells, AVERAGED) for cells in (slant_map, ground_map))
     out.states(
         "range-Doppler image and the map of the slant plane",
@@ -166,8 +161,7 @@ def _shadow(out: Section, power: np.ndarray, grid: ImageGrid, tangent: float) ->
     inside = np.flatnonzero(below & (x < end + 30))
     measured_end = float(x[inside[-1]] + grid.spacing[1] / 2)
     out.number("end of the cylinder's shadow", measured_end, expected=end)
-    caption = "Profile through the solids: layover in front, shadow behind."
-    out.plot([("mean over azimuth", x, 10 * np.log10(profile / lit))], "ground range, m", "dB over the ground", caption)
+    out.plot("Profile through the solids", [("mean over azimuth", x, 10 * np.log10(profile / lit))])
 
 
 def _db(power: np.ndarray) -> np.ndarray:

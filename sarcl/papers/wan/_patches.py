@@ -35,10 +35,12 @@ def section(lab: Lab) -> Section:
     out.say(slope=slope)
     in_order = np.argsort(RISING)
     out.plot(
-        [(name, np.arange(1, 17), 10 * np.log10(found[in_order] / found.min()))
-         for name, found in (("a: roughness", rough), ("b: permittivity", eps))],
-        "place in the order of rising values", "dB over the darkest patch", "Brightness of the 16 patches.",
-    )  # fmt: skip
+        "Brightness of the 16 patches",
+        [
+            (name, np.arange(1, 17), 10 * np.log10(found[in_order] / found.min()))
+            for name, found in (("a: roughness", rough), ("b: permittivity", eps))
+        ],
+    )
     out.keep(roughness=rough, permittivity=eps, slope=slope)
     return out
 

@@ -42,12 +42,10 @@ def section(lab: Lab) -> Section:
     out.states("phases", many.uniform, many.uniform > 0.01)
     out.keep(contrast=many.contrast, contrast_of_few=few.contrast, difference_of_few=few.difference)
     levels = curves[0][1]
-    caption = "Amplitudes of the image's resolution cells (figure 3 a)."
+    out.plot("Amplitudes of the image's resolution cells", [*curves, ("Rayleigh", levels, rayleigh(levels))])
     out.plot(
-        [*curves, ("Rayleigh", levels, rayleigh(levels))], "amplitude over its root mean square", "density", caption
+        "Phases of the image's resolution cells", [*phases, ("uniform", phases[0][1], np.full(16, 1 / (2 * np.pi)))]
     )
-    caption = "Phases of the image's resolution cells (figure 3 b)."
-    out.plot([*phases, ("uniform", phases[0][1], np.full(16, 1 / (2 * np.pi)))], "phase, rad", "density", caption)
     out.say(
         few_facets=curves[1][0],
         few_contrast=few.contrast,

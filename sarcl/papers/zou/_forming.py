@@ -61,13 +61,12 @@ def section(lab: Lab) -> Section:
         )
         degrees = np.degrees(errors.angle)
         out.plot(
+            "Error of waveform forming at each azimuth",
             [
                 ("one anchor, as in the paper", degrees, _db(errors.one)),
                 (f"{anchors} anchors", degrees, _db(errors.own)),
             ],
-            "azimuth, degrees",
-            "error over the echo, dB",
-            f"Error of waveform forming at each azimuth, {name}, HH (figure 8).",
+            name=name,
         )
         own_seconds = sum(report.seconds.values())
         times.append([
@@ -79,13 +78,7 @@ def section(lab: Lab) -> Section:
             "seconds_per_azimuth": errors.seconds[0], "seconds_one_anchor": errors.seconds[1], "anchors": anchors,
             "seconds_own": own_seconds, "predicted": report.predicted_error,
         }})  # fmt: skip
-    caption = (
-        f"Time of all {n} pulses: one run of the grid per azimuth (estimated from {N_AZIMUTHS + 1} runs), one anchor, "
-        "and as many anchors as the tolerance needs, HH and VH."
-    )
-    out.table(
-        ["target", f"{n} runs, s", "one anchor, s", "several anchors, s", "runs over several anchors"], times, caption
-    )
+    out.table("Time of all {n} pulses", times, n=n, n_runs=N_AZIMUTHS + 1)
     return out
 
 

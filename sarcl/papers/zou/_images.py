@@ -40,17 +40,24 @@ def section(name: str, lab: Lab) -> Section:
     raws = {polarization: both.select(polarization=polarization) for polarization in BOTH}
     for polarization, raw in raws.items():
         field = received(raw, FIELD_RATE, 0.0)
-        caption = f"Envelope of the field at the receiver, {polarization} (figure 5 {target.letter})."
         out.picture(
-            _db(np.abs(field.samples)), *_ends(field, raw), DELAY_NAME, SLOW_NAME, caption, floor_db=FLOOR, unit=LEVEL
+            "Envelope of the field at the receiver",
+            _db(np.abs(field.samples)),
+            *_ends(field, raw),
+            floor_db=FLOOR,
+            unit=LEVEL,
+            words={"polarization": polarization, "target": target},
         )
     records = {polarization: received(raw) for polarization, raw in raws.items()}
     for part, values in (("I", records["HH"].samples.real), ("Q", records["HH"].samples.imag)):
-        caption = f"{part} samples, HH, 600 MHz (figure 6 {target.letter})."
         out.picture(
-            values, *_ends(records["HH"], raws["HH"]), DELAY_NAME, SLOW_NAME, caption,
-            floor_db=-2 * float(values.max()), unit="m",
-        )  # fmt: skip
+            "Samples",
+            values,
+            *_ends(records["HH"], raws["HH"]),
+            floor_db=-2 * float(values.max()),
+            unit="m",
+            words={"part": part, "target": target},
+        )
     view = _View(lab, name)
     chains = {polarization: compress(recorded(records[polarization], raw)) for polarization, raw in raws.items()}
     sampled = {polarization: view.range_doppler(chain) for polarization, chain in chains.items()}
@@ -87,10 +94,7 @@ def _draw_waves(out: Section, raw: PhaseHistory) -> None:
     (first, last), _ = _ends(field, raw)
     delay = np.linspace(first, last, field.samples.shape[1])
     rows = (("middle of the track", raw.n_rows // 2), ("beginning", 0))
-    caption = "Field of two pulses at the receiver, HH."
-    out.plot(
-        [(name, delay, field.samples[row].real) for name, row in rows], DELAY_NAME, "field times range, m", caption
-    )
+    out.plot("Field of two pulses at the receiver", [(name, delay, field.samples[row].real) for name, row in rows])
 
 
 def _say(out: Section, found: Levels, both: PhaseHistory) -> None:

@@ -99,13 +99,5 @@ def _table(out: Section, lab: Lab) -> None:
             f"{plan['run_seconds'] / 60:.0f}", f"{needs.seconds / 3600:.1f}",
         ])  # fmt: skip
         out.keep(**{target.name: {"run_bytes": plan["run_bytes"], "runs": plan["runs"], "seconds": needs.seconds}})
-    caption = "Targets of table 2."
-    out.table(["target", "table 2", "here: ground range x azimuth x height, m", "facets"], sizes, caption, text=True)
-    out.table(
-        ["target", "cells of the grid", "time steps", "GiB per run", "runs", "minutes per run", "hours"],
-        full,
-        f"What the sizes of the paper take with at least {CELLS[False]} cells per shortest wavelength and "
-        f"{FULL_BYTES / 1e9:g} GB for a run, forecast for this machine at its present speed "
-        "(sarcl.plan). Figure 8 takes 18 runs more for cuboid and "
-        "sharp cone each.",
-    )
+    out.table("Targets of table 2", sizes, text=True)
+    out.table("What the sizes of the paper take", full, cells=CELLS[False], gigabytes=FULL_BYTES / 1e9)

@@ -60,13 +60,14 @@ def section(lab: Lab) -> Section:
     for (item, within), measured, exact in zip(items, *peaks, strict=True):
         out.number(item, measured, expected=exact, within=within)
     out.say(a=a, front=peaks[0][1], creeping=np.pi / 2 * a)
-    caption = "Cut along slant range through the image of the sphere, HH."
-    out.plot(cuts, "slant range about the centre, m", "dB re 1 m²", caption)
+    out.plot("Cut along slant range through the image", cuts)
     pulses = f / 1e9
     out.plot(
-        [("full wave, mean over pulses", pulses, 20 * np.log10(np.sqrt((np.abs(samples) ** 2).mean(axis=0)))),
-         ("Mie's series", pulses, 20 * np.log10(np.abs(mie)))],
-        "frequency, GHz", "radar cross section, dB re 1 m²", "Radar cross section of the sphere over the band, HH.",
-    )  # fmt: skip
+        "Radar cross section of the sphere",
+        [
+            ("full wave, mean over pulses", pulses, 20 * np.log10(np.sqrt((np.abs(samples) ** 2).mean(axis=0)))),
+            ("Mie's series", pulses, 20 * np.log10(np.abs(mie))),
+        ],
+    )
     out.keep(error=apart, cross_db=level, ka=[float(2 * np.pi * v * a / SPEED_OF_LIGHT) for v in (f[0], f[-1])])
     return out

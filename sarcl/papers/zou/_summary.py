@@ -25,12 +25,7 @@ def section(lab: Lab) -> Section:
             f"{_db(level.rms[1] / level.rms[0]):.0f}", len(plan["anchors"]), plan["runs"],
             f"{sum(report.seconds.values()):.0f}",
         ])  # fmt: skip
-    out.table(
-        ["target", "HH, full wave, dB re 1 m²", "HH, physical optics, dB re 1 m²", "echoes differ by",
-         "VH over HH, image, dB", "VH over HH, echoes, dB", "anchors", "runs of the grid", "s"],
-        rows, "Brightest pixels, difference of the echoes of physical optics from those of full wave (rms over the rms "
-        "of full wave), polarisation, and what the full-wave echoes took.",
-    )  # fmt: skip
+    out.table("Brightest pixels", rows)
     others = np.array([v for name, v in cross.items() if name != "sphere"])
     middle = float(np.median(others))
     out.states(
