@@ -11,5 +11,3 @@ For this folder alone:
     _surface              the grid, or the plane that touches a grid of listed points
     _view                 the antennas in the middle of the rows that saw a position
 """
-
-__all__ = ["point_response"]

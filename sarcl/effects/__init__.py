@@ -11,5 +11,3 @@ For this folder alone:
 
     _random_motion   smooth random processes: sums of cosines
 """
-
-__all__ = ["motion", "noise", "noise_level", "stop_and_go"]

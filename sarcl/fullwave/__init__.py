@@ -26,5 +26,3 @@ For this folder alone:
     _mirrors      targets that a mirror leaves unchanged, and the anchors that then share a run
     _pulse        the waveform of the incident wave, by its spectrum
 """
-
-__all__ = ["anchors", "bodies", "echoes", "fields", "lattice", "runs", "target"]

@@ -30,28 +30,3 @@ For this folder alone:
     _row_coverage    which rows saw a pixel, and the sum of their weights: the gain of the image
     _rows_in_phase   errors of interpolation that add up in phase over a few rows
 """
-
-__all__ = [
-    "antenna_beam",
-    "backproject",
-    "backproject_options",
-    "choose_method",
-    "collection",
-    "compress",
-    "default_grid",
-    "direct",
-    "engine",
-    "factorized",
-    "float64",
-    "focus_options",
-    "focusing_task",
-    "forecast",
-    "pixel_taper",
-    "polar_format",
-    "profile_energy",
-    "range_doppler",
-    "run",
-    "strip_map",
-    "tiling",
-    "unseen_pixels",
-]

@@ -31,16 +31,3 @@ For this folder alone:
     _partial_hdf5  an HDF5 file that appears at its path only when it is complete
     _ply           PLY files: vertices and polygons, each number of the type that its header declares
 """
-
-__all__ = [
-    "elevation",
-    "formats",
-    "hdf5",
-    "input_paths",
-    "mesh",
-    "orbit_files",
-    "output_paths",
-    "sarcl_hdf5",
-    "toml",
-    "xml",
-]

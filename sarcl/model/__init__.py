@@ -27,23 +27,3 @@ For this folder alone:
     _orbit_attitude   attitudes of antennas in orbit, and directions around a beam
     _time_samples     samples in time as samples over frequency, for PhaseHistory.from_time
 """
-
-__all__ = [
-    "antenna",
-    "antenna_array",
-    "antenna_pattern",
-    "concatenation",
-    "dates",
-    "image",
-    "image_grid",
-    "lazy_rows",
-    "listed_surface",
-    "orbit",
-    "phase_history",
-    "pointing",
-    "radar",
-    "row_positions",
-    "store",
-    "trajectory",
-    "waveform",
-]

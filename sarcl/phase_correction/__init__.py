@@ -18,5 +18,3 @@ For this folder alone:
     _search            search for the phases and ranges that maximise the sharpness of bright points
     _smooth_search     the same for phases of few cosines
 """
-
-__all__ = ["autofocus"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections import Counter
 from functools import cache
 from pathlib import Path
@@ -115,8 +116,15 @@ def test_a_room_has_a_contents_page(room):
     own |= {a.name for n in tree.body if isinstance(n, ast.ImportFrom) for a in n.names}
     own |= {ast.unparse(n.targets[0]) for n in tree.body if isinstance(n, ast.Assign)}
     own |= set(verbs.HOMES) if room == "sarcl.verbs" else set()
-    assert {n for n in inside if not n.startswith("_")} <= public, "__all__ names every file that others may import"
-    assert public <= {n for n in inside if not n.startswith("_")} | own
+    offered = {n for n in inside if not n.startswith("_")}
+    if len(tree.body) > 1:  # else the page alone says what others may import
+        assert offered <= public, "__all__ names every file that others may import"
+    assert public <= offered | own
+    heads = [line.strip() for line in lines if line.endswith(":") and not line.startswith(" ")]
+    sections = re.split(r"^For (?:other folders|this folder alone).*:$", "\n".join(lines), flags=re.MULTILINE)
+    for head, section in zip(heads, sections[1:], strict=False):
+        names = {line.split()[0].rstrip("/") for line in section.splitlines() if line.startswith("    ")}
+        assert {n.startswith("_") for n in names} <= {head.startswith("For this folder")}, (head, names)
 
 
 def test_the_front_door_stands_alone():

@@ -11,5 +11,3 @@ For this folder alone:
     _subapertures    runs of pulses, decimated level by level
     _tile_coverage   which of the largest tiles lie in the range window and beam of which rows
 """
-
-__all__ = ["factorized", "plan"]

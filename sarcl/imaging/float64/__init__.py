@@ -9,5 +9,3 @@ For this folder alone:
 
     _pulse_records   rows as kernels/geometry_float64.clh lays them out
 """
-
-__all__ = ["direct", "plan"]

@@ -26,5 +26,3 @@ For this folder alone:
     _uneven_energy    errors where energy lies unevenly over rows and ranges: ends of the Doppler band, dark columns
     _velocity         ranges from a track to points as hyperbolas: effective velocity at several slant ranges
 """
-
-__all__ = ["range_doppler"]

@@ -12,5 +12,3 @@ For this folder alone:
 
     _points      the tiling of listed points
 """
-
-__all__ = ["lines", "of_grid", "plane", "tiling", "tree"]
