@@ -20,12 +20,9 @@ For this folder alone:
     _current_sums sums of currents over cells for many pulses, on a device
     _currents     one run: the equivalent currents of a target at the frequencies that are asked for
     _dispersion   plane waves of the grid: wavenumber, frequency, polarisation, energy flux
-    _far_field    echo amplitudes of currents, without the grid's own dispersion
     _formed_echoes  waveform forming: echoes of many pulses from the currents of one run
     _incident     a plane wave that enters through the faces of a box
     _lists        lists of cells on a device
     _mirrors      targets that a mirror leaves unchanged, and the anchors that then share a run
     _pulse        the waveform of the incident wave, by its spectrum
 """
-
-__all__ = ["anchors", "bodies", "echoes", "fields", "lattice", "runs", "target"]

@@ -25,24 +25,3 @@ For this folder alone:
 
     _grid_image             from a grid of wavenumbers on a device to the image, there or on the host
 """
-
-__all__ = [
-    "cost_model",
-    "device_profiles",
-    "double_double",
-    "error_bounds",
-    "interpolation",
-    "interpolator_choice",
-    "nufft2d",
-    "plan",
-    "polynomials",
-    "pulse_geometry",
-    "range_profiles",
-    "run_options",
-    "shared_tile",
-    "tile_constants",
-    "tiles",
-    "transforms",
-    "weighted_samples",
-    "windows",
-]

@@ -25,16 +25,3 @@ For this folder alone:
     _trial_record  results of devices' trials, on disk
     _programs      source texts of kernels, and precautions for building programs
 """
-
-__all__ = [
-    "choose_device",
-    "device",
-    "device_list",
-    "failures",
-    "fft",
-    "fft_batches",
-    "launch_numbers",
-    "memory_budget",
-    "native_functions",
-    "pipeline",
-]

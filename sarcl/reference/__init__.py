@@ -29,28 +29,3 @@ For other folders:
     transposition  what comes before and after an FFT of columns
     weighted_samples  samples times weights, turned to other reference ranges
 """
-
-__all__ = [
-    "backproject",
-    "certain_shadows",
-    "compress",
-    "equations",
-    "facet",
-    "facet_pieces",
-    "fdtd",
-    "geometry",
-    "image",
-    "interp",
-    "lit_part",
-    "map_drift",
-    "merge",
-    "mie",
-    "polar_format",
-    "quality",
-    "range_doppler",
-    "rays",
-    "shadow",
-    "spectral_echo",
-    "transposition",
-    "weighted_samples",
-]

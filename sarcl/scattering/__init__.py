@@ -24,17 +24,3 @@ For this folder alone:
     _random_surface        cells of rough facets, with a random height and amplitude each
     _rough_surface         scattering diagrams of rough facets (SARAS)
 """
-
-__all__ = [
-    "antenna_weight_error",
-    "antenna_weights",
-    "facet_kinds",
-    "facet_plan",
-    "facets",
-    "mesh_quality",
-    "physical_optics",
-    "pulse_nodes",
-    "rough_pieces",
-    "scatterers",
-    "subdivision",
-]

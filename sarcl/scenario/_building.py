@@ -62,7 +62,7 @@ class Builder:
         """The receiver's Trajectory, None where it moves with the transmitter."""
         if self.scenario.receiver is None:
             return None
-        self._check_local(next(iter(self.scenario.receiver)), "receiver")
+        self._check_local(next(iter(self.section("receiver"))), "receiver")
         return self._aimed(self.one("receiver"), "receiver_pointing" if self.scenario.receiver_pointing else "pointing")
 
     def antenna(self) -> Antenna | tuple[Antenna, Antenna] | None:
@@ -96,7 +96,7 @@ class Builder:
 
         materials = {
             name: self.call(("materials", name), table, partial(Material, name=name))
-            for name, table in (self.scenario.materials or {}).items()
+            for name, table in self.scenario.tables.get("materials", {}).items()
         }
         scene, origin = None, self.place()
         for kind, value in self.section("scene").items():

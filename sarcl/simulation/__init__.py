@@ -32,21 +32,3 @@ For this folder alone:
     _single_channel    echoes of one transmitting and one receiving antenna
     _unseen_scene      refusal of scenes outside every beam or range window, before anything is planned
 """
-
-__all__ = [
-    "channels",
-    "echo",
-    "echo_check",
-    "echo_options",
-    "echo_output",
-    "echo_request",
-    "echo_sampling",
-    "echo_task",
-    "scene_echoes",
-    "scene_options",
-    "scene_plan",
-    "scene_preparation",
-    "spectral",
-    "spreading",
-    "track_options",
-]

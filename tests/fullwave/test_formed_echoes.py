@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from helpers.current_cases import antennas, difference, random_currents, twin, unit
 from helpers.devices import as_gpu
+from helpers.far_field import amplitude
 
 from sarcl.fullwave import _current_sums, _dispersion, _formed_echoes
 from sarcl.fullwave._currents import Currents
-from sarcl.fullwave._far_field import amplitude
 from sarcl.fullwave._formed_echoes import formed_echoes, paths_of
 from sarcl.fullwave._incident import PlaneWave
 from sarcl.opencl.device import Device

@@ -9,13 +9,13 @@ import numpy as np
 import pyopencl
 import pytest
 from helpers.devices import opened, variants
+from helpers.far_field import amplitude
 from helpers.fdtd_cases import random_target, sphere_intervals
 
 from sarcl import shapes
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.fullwave import _currents
 from sarcl.fullwave._currents import Decay, currents, sample_period
-from sarcl.fullwave._far_field import amplitude
 from sarcl.fullwave._incident import PlaneWave, wave_table
 from sarcl.fullwave._lists import SAMPLES
 from sarcl.fullwave._pulse import Pulse

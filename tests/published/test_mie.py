@@ -5,18 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from helpers.devices import opened, variants
-from helpers.fdtd_cases import sphere_intervals
+from helpers.far_field import amplitude
 
 from sarcl import shapes
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.fullwave._currents import currents
-from sarcl.fullwave._far_field import amplitude
 from sarcl.fullwave._incident import PlaneWave
 from sarcl.fullwave._pulse import Pulse
 from sarcl.fullwave.bodies._cut_cells import conductor
 from sarcl.fullwave.bodies._mesh_lines import mesh_lines
 from sarcl.fullwave.bodies.materials import Body, bodies
-from sarcl.fullwave.lattice import lattice_around
+from sarcl.fullwave.lattice import lattice_around, sphere_intervals
 from sarcl.fullwave.target import material_edges
 from sarcl.reference.mie import conducting_sphere, dielectric_sphere
 

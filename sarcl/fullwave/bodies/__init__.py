@@ -15,5 +15,3 @@ For this folder alone:
     _mesh_lines   where grid lines are inside bodies of closed meshes
     _thin_parts   parts of a mesh that are thinner than a cell: refusals, and sheets in place of narrow strips
 """
-
-__all__ = ["materials"]

@@ -41,7 +41,7 @@ PIXELS = {True: 64, False: 512}
 
 def figure_9(lab: Lab) -> Section:
     """Figures 9 and 10: the raw signal before range compression, by both generators, and its image."""
-    out = Section("raw", "The raw signal of a cone, and its image (figures 9 and 10)")
+    out = Section.of("saras", "raw")
     half = SIDE / 2
     scene, track = _cone(), _track(SIDE)
     window = half * np.sin(LOOK) + SPEED_OF_LIGHT * CHIRP.duration / 4 + 20
@@ -52,25 +52,25 @@ def figure_9(lab: Lab) -> Section:
     raw, direct = (make(scene, CHIRP, track, tolerance=1e-2, **options) for make in (spectral_echo, echo))
     paper = spectral_echo(scene, CHIRP, track, variant="saras", tolerance=PAPER_TOLERANCE, **options)
     apart, of_paper = (_apart(made, direct) for made in (raw, paper))
-    item = "raw signal by Fourier transforms and by the sum over facets and pulses"
-    measured = f"differ by {apart:.1e}"
-    rule = "below 2e-2, the tolerances of both together"
-    out.states(item, "section IV", "the same signal", measured, apart < 2e-2, value=apart, rule=rule, basis="theory")
+    out.states("raw signal by Fourier transforms and by the sum over facets and pulses", apart, apart < 2e-2)
     footprint = WIDTH * np.hypot(HEIGHT, DISTANCE)
     order = SPEED_OF_LIGHT / CHIRP.center * np.hypot(HEIGHT, DISTANCE) / (2 * np.pi * footprint**2)
-    item = "error of the paper's transfer function, by stationary phase"
-    source = "equations 26 to 36, footnote 2"
-    expected = f"of the order of lambda R0/(2 pi X^2), {order:.1e} here"
-    why = "by sarcl.spectral_echo(variant='saras'), against the sum over facets and pulses"
-    rule = "within a factor of 5"
-    out.states(item, source, expected, f"{of_paper:.1e}", order / 5 < of_paper < 5 * order, why, of_paper, rule=rule)
+    out.states(
+        "error of the paper's transfer function, by stationary phase",
+        of_paper,
+        order / 5 < of_paper < 5 * order,
+        order=order,
+    )
     _show_raw(out, raw, window)
     _show_image(out, lab, raw, track)
     out.say(
-        f"The paper gives neither geometry nor sizes. Here the antenna is {HEIGHT / 1e3:g} km high and looks "
-        f"{np.degrees(LOOK):.0f} deg off the vertical; the field is {SIDE:g} m wide, the cone {2 * CONE[0]:g} m wide "
-        f"and {CONE[1]:.1f} m high. Facets of {CELL:g} m, four per pixel of {STEP:g} m, have random amplitudes and "
-        "phases, and their corners random heights of 0.1 wavelengths, as in the paper."
+        height_km=HEIGHT / 1e3,
+        look_deg=np.degrees(LOOK),
+        side=SIDE,
+        cone_width=2 * CONE[0],
+        cone_height=CONE[1],
+        cell=CELL,
+        step=STEP,
     )
     return out
 
@@ -100,11 +100,14 @@ def _show_raw(out: Section, raw: PhaseHistory, window: float) -> None:
     real = signal.real[np.ix_(rows, columns)] / np.abs(signal).max()
     top = float(np.percentile(np.abs(real), 99))
     out.picture(
-        np.clip(real, -top, top), _edges(ranges[columns]), _edges(azimuth[rows]),
-        "slant range from the middle, m", "azimuth of the antenna, m",
-        "Real part of the raw signal, before range compression (figure 9).", floor_db=-2 * top,
-        unit="of the largest modulus", equal=True,
-    )  # fmt: skip
+        "Real part of the raw signal",
+        np.clip(real, -top, top),
+        _edges(ranges[columns]),
+        _edges(azimuth[rows]),
+        floor_db=-2 * top,
+        unit="of the largest modulus",
+        equal=True,
+    )
 
 
 def _show_image(out: Section, lab: Lab, raw: PhaseHistory, track: Trajectory) -> None:
@@ -122,14 +125,21 @@ def _show_image(out: Section, lab: Lab, raw: PhaseHistory, track: Trajectory) ->
     profile = power[np.abs(azimuth) < 2].mean(axis=0)
     front = -CONE[0] * float(np.sin(LOOK))  # the whole line from foot to tip lies at one range
     cell = SPEED_OF_LIGHT / 2 / CHIRP.bandwidth
-    item = "brightest slant range of the cone in the range-Doppler image"
-    out.number(item, "figure 10", front, float(ranges[profile.argmax()]), 1.5 * cell, "m", ".1f", basis="geometry")
+    out.number(
+        "brightest slant range of the cone in the range-Doppler image",
+        float(ranges[profile.argmax()]),
+        expected=front,
+        within=1.5 * cell,
+    )
     out.picture(
-        10 * np.log10(np.maximum(power / np.median(power), 1e-9)), _edges(ranges), _edges(azimuth),
-        "slant range from the middle, m", "azimuth, m",
-        "Range-Doppler image of this raw signal, relative to the median (figure 10).", floor_db=-30.0,
-        percentile=99.5, equal=True,
-    )  # fmt: skip
+        "Range-Doppler image of this raw signal",
+        10 * np.log10(np.maximum(power / np.median(power), 1e-9)),
+        _edges(ranges),
+        _edges(azimuth),
+        floor_db=-30.0,
+        percentile=99.5,
+        equal=True,
+    )
 
 
 def _edges(middles: np.ndarray) -> tuple[float, float]:
@@ -141,7 +151,7 @@ def _edges(middles: np.ndarray) -> tuple[float, float]:
 def times(lab: Lab) -> Section:
     """Section V: seconds and error of both generators."""
     n = PIXELS[lab.quick]
-    out = Section("times", f"Run times of {n} x {n} pixels (section V)")
+    out = Section.of("saras", "times", n=n)
     rows, worst = [], 0.0
     for cells in (1, 2, 3, 4):
         side = n * STEP / 2
@@ -175,24 +185,9 @@ def times(lab: Lab) -> Section:
         )
         out.keep(**{f"{square} facets per pixel: seconds and errors": results})
         worst = max(worst, results[1], results[3])
-    caption = (
-        "Seconds on the device of this run, scene included, and the measured error against the exact sum (random "
-        "samples of the raw signal, recomputed in double precision facet by facet)."
-    )
-    out.table(
-        ["facets per pixel", "VAX, 512 x 512, s", "Fourier transforms, s", "error", "sum, s", "error"], rows, caption
-    )
-    item = "largest error of the timed raw signals"
-    expected = f"below the tolerance, {RAW_TOLERANCE:g}"
-    rule = f"at most {RAW_TOLERANCE:g}"
-    out.states(
-        item, "section V", expected, f"{worst:.1e}", worst <= RAW_TOLERANCE, value=worst, rule=rule, basis="theory"
-    )
-    out.say(
-        "A pixel is 0.8 m on the ground; a facet of the paper is a square, of which sarcl makes two triangles. The sum "
-        "over facets and pulses grows with their product; the time of the Fourier transforms grows with the number of "
-        "facets and, N^2 log N, with the size of the map."
-    )
+    out.table("Seconds on the device of this run", rows)
+    out.states("largest error of the timed raw signals", worst, worst <= RAW_TOLERANCE, raw_tolerance=RAW_TOLERANCE)
+    out.say()
     return out
 
 

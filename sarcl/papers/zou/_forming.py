@@ -32,33 +32,41 @@ class Comparison:
 
 def section(lab: Lab) -> Section:
     """Figure 8."""
-    out = Section("forming", "Waveform forming and one run of the grid per azimuth (figure 8)")
+    out = Section.of("zou", "forming")
     n, times = len(lab.radar.track), []
     for name in (BRICK, CONE):
         errors = compared(lab, name)
         report, plan = report_of(lab.full_wave(name))
         anchors, one, own = len(plan["anchors"]), *errors.totals
         out.states(
-            f"{name}: one anchor against one run per azimuth", "figure 8" if name == BRICK else "section 4",
-            "the difference is not significant", f"differs by {one:.1%}, by up to {errors.one.max():.0%} at an azimuth",
-            one < FINE, "the beam of table 1 reaches 9.6 degrees to either side, where the currents are not those of "
-            "the middle", one, rule=f"rms over {N_AZIMUTHS} azimuths below {FINE:.0%}", cause="interpretation",
-        )  # fmt: skip
-        item = f"{name}: {anchors} anchors against one run per azimuth"
-        expected = f"at most {TOLERANCE:.0%}"
-        measured = f"differs by {own:.1%}, by up to {errors.own.max():.0%} at an azimuth"
-        why = f"predicted from the anchors alone: {report.predicted_error:.1%}"
-        rule = f"rms over {N_AZIMUTHS} azimuths off the anchors below {TOLERANCE:.0%}"
-        out.states(item, "tolerance", expected, measured, own < TOLERANCE, why, own, rule=rule, basis="theory")
+            "{name}: one anchor against one run per azimuth",
+            one,
+            one < FINE,
+            source="figure 8" if name == BRICK else "section 4",
+            name=name,
+            worst=errors.one.max(),
+            n_azimuths=N_AZIMUTHS,
+            fine=FINE,
+        )
+        out.states(
+            "{name}: {anchors} anchors against one run per azimuth",
+            own,
+            own < TOLERANCE,
+            name=name,
+            anchors=anchors,
+            worst=errors.own.max(),
+            tolerance=TOLERANCE,
+            n_azimuths=N_AZIMUTHS,
+            predicted=report.predicted_error,
+        )
         degrees = np.degrees(errors.angle)
         out.plot(
+            "Error of waveform forming at each azimuth",
             [
                 ("one anchor, as in the paper", degrees, _db(errors.one)),
                 (f"{anchors} anchors", degrees, _db(errors.own)),
             ],
-            "azimuth, degrees",
-            "error over the echo, dB",
-            f"Error of waveform forming at each azimuth, {name}, HH (figure 8).",
+            name=name,
         )
         own_seconds = sum(report.seconds.values())
         times.append([
@@ -70,13 +78,7 @@ def section(lab: Lab) -> Section:
             "seconds_per_azimuth": errors.seconds[0], "seconds_one_anchor": errors.seconds[1], "anchors": anchors,
             "seconds_own": own_seconds, "predicted": report.predicted_error,
         }})  # fmt: skip
-    caption = (
-        f"Time of all {n} pulses: one run of the grid per azimuth (estimated from {N_AZIMUTHS + 1} runs), one anchor, "
-        "and as many anchors as the tolerance needs, HH and VH."
-    )
-    out.table(
-        ["target", f"{n} runs, s", "one anchor, s", "several anchors, s", "runs over several anchors"], times, caption
-    )
+    out.table("Time of all {n} pulses", times, n=n, n_runs=N_AZIMUTHS + 1)
     return out
 
 

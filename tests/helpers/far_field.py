@@ -12,9 +12,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from . import _dispersion
-from ._currents import Currents
-from .lattice import COURANT
+from sarcl.fullwave import _dispersion
+from sarcl.fullwave._currents import Currents
+from sarcl.fullwave.lattice import COURANT
 
 
 def amplitude(currents: Currents, direction: np.ndarray, polarization: np.ndarray) -> np.ndarray:
