@@ -3,35 +3,31 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...base.constants import SPEED_OF_LIGHT
-from ...base.rows import groups, spread_over
-from ...base.vectors import dot
-from ...model.phase_history import PhaseHistory
-from ...numerics import interpolation
-from ...numerics.pulse_geometry import PulseGeometry
+from ..base.constants import SPEED_OF_LIGHT
+from ..base.rows import spread_over
+from ..base.vectors import dot
+from . import interpolation
+from .pulse_geometry import PulseGeometry
 
 GAP = 5.0  # a step between pulses that is this many times longer than the median begins a new run
 
 
-def runs_of(raw: PhaseHistory) -> tuple[np.ndarray, list[tuple[int, int]]]:
-    """An order of the rows, (n,), in which the rows of a run are consecutive; and the runs (first, last).
+def smooth_runs(tx: np.ndarray, rx: np.ndarray, group: np.ndarray | None = None) -> list[tuple[int, int]]:
+    """Runs (first, stop) of pulses that follow one another without a gap in the track.
 
-    A run is smooth: its rows share channel and frequency, and follow one another without a gap in the track.
+    tx, rx  positions, m (n, 3);  group  (n,): pulses of a run have the same number; None: all have
     """
-    channel = raw.tx_channel, raw.rx_channel, raw.polarization
-    group = groups(raw.n_rows, raw.frequency, raw.frequency_step, *channel)
-    time = np.arange(raw.n_rows) if raw.time is None else raw.time
-    order = np.lexsort((np.arange(raw.n_rows), time, group))
-    step = np.abs(np.diff(raw.tx[order], axis=0)).sum(axis=1) + np.abs(np.diff(raw.rx[order], axis=0)).sum(axis=1)
+    step = np.abs(np.diff(tx, axis=0)).sum(axis=1) + np.abs(np.diff(rx, axis=0)).sum(axis=1)
     usual = float(np.median(step)) if len(step) else 0.0
-    cut = np.flatnonzero((np.diff(group[order]) != 0) | (step > GAP * usual)) + 1
-    edges = [0, *cut.tolist(), raw.n_rows]
-    return order, list(itertools.pairwise(edges))
+    is_cut = step > GAP * usual
+    if group is not None:
+        is_cut |= np.diff(group) != 0
+    edges = [0, *(np.flatnonzero(is_cut) + 1).tolist(), len(tx)]
+    return list(itertools.pairwise(edges))
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,17 +181,3 @@ def _phases(
         grown = (x**2).sum(axis=1) - 2 * along
         path += grown / (near + np.sqrt(near**2 + grown)) / len(track.ends)
     return np.exp(4j * np.pi * frequency / SPEED_OF_LIGHT * path)
-
-
-def chains(leaf: int, largest: int) -> Iterator[tuple[int, ...]]:
-    """Sides of the tiles of each level, from the root to the leaf: ratios of 2 to 16, at most four levels."""
-    yield (leaf,)
-    for ratio in (2, 4, 8, 16):
-        if leaf * ratio >= 2 * largest:
-            return
-        yield (leaf * ratio, leaf)
-        for second in (4, 8, 16):
-            if leaf * ratio * second < 2 * largest:
-                yield (leaf * ratio * second, leaf * ratio, leaf)
-                if leaf * ratio * second * 8 < 2 * largest:
-                    yield (leaf * ratio * second * 8, leaf * ratio * second, leaf * ratio, leaf)
