@@ -47,6 +47,13 @@ class Decimation:
     filter: np.ndarray
     error: float
 
+    @property
+    def neighbours(self) -> np.ndarray:
+        """First kept pulse around each pulse, and the row of the filter that weighs it and the next: int32 (n, 2)."""
+        first, count, kept, row = self.blocks.T
+        along = np.arange(count.sum()) - np.repeat(first - first[0], count)
+        return np.stack([np.repeat(kept, count), np.repeat(row, count) + along], axis=1).astype(np.int32)
+
 
 def decimated(track: PulseGeometry, ratio: int, taps: int, oversample: float) -> Decimation:
     """Decimate each run by `ratio`; beyond its ends as many are kept as the filter of `taps` needs."""
@@ -97,15 +104,21 @@ def _positions(run: np.ndarray, at: np.ndarray) -> np.ndarray:
 
 
 def rate(track: PulseGeometry, points: np.ndarray, axes: np.ndarray | None) -> float:
-    """Largest change of the gradient of range at points, m (n, 3), from one row to the next; no unit.
+    """Largest change of the gradient of range at points, m (n, 3), from one row to the next; see `rates`."""
+    return float(rates(track, points, axes).max(initial=0.0))
+
+
+def rates(track: PulseGeometry, points: np.ndarray, axes: np.ndarray | None, most: int = 512) -> np.ndarray:
+    """Largest change of the gradient of range at each of the points, m (n, 3), from one row to the next; no unit.
 
     axes  unit vectors (2, 3) of the plane that the pixels lie in, or None for pixels anywhere
+    most  pulses of a run at which it is computed
     """
-    worst = 0.0
+    largest = np.zeros(len(points))
     for begin, end in track.runs:
         if end - begin < 2:
             continue
-        rows = begin + spread_over(end - begin - 1, 512)
+        rows = begin + spread_over(end - begin - 1, most)
         change = np.zeros((len(points), len(rows), 3))
         for antenna in track.ends:
             directions = []
@@ -114,8 +127,8 @@ def rate(track: PulseGeometry, points: np.ndarray, axes: np.ndarray | None) -> f
                 directions.append(d / np.maximum(np.linalg.norm(d, axis=-1, keepdims=True), 1e-9))
             change += (directions[1] - directions[0]) / len(track.ends)
         seen = change if axes is None else change @ axes.T
-        worst = max(worst, float(np.linalg.norm(seen, axis=-1).max()))
-    return worst
+        np.maximum(largest, np.linalg.norm(seen, axis=-1).max(axis=1), out=largest)
+    return largest
 
 
 def filter_error(
@@ -124,14 +137,18 @@ def filter_error(
     centers: np.ndarray,
     radius: float,
     frequency: float,
-    axes: np.ndarray | None,
+    axes: np.ndarray | None = None,
+    directions: np.ndarray | None = None,
 ) -> float:
     """Largest relative error of a pulse made from the kept ones, `radius` m away from each of `centers`, m (m, 3).
 
+    axes        unit vectors (2, 3) of the plane in which points lie;  directions  of points from the centres, unit
+                vectors (n, 3), in place of those along the coordinates, or in the plane
     Computed for the track as it is, not for a smooth one: for the pulses of 32 blocks spread over the track, and for
     the 1024 pulses where the track deviates most from a smooth one.
     """
-    directions = np.concatenate([np.eye(3), -np.eye(3)])
+    if directions is None:
+        directions = np.concatenate([np.eye(3), -np.eye(3)])
     if axes is not None:
         angle = 2 * np.pi * np.arange(8) / 8
         directions = np.cos(angle)[:, None] * axes[0] + np.sin(angle)[:, None] * axes[1]
