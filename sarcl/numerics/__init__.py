@@ -15,6 +15,7 @@ For other folders:
     range_profiles          samples in frequency to oversampled range profiles and back
     run_options             options that every verb has
     shared_tile             tiles of a grid that a work-group sums in local memory
+    subapertures            pulses of a track decimated to every n-th position, and the error of that
     tile_constants          records of tiles and pulses on a device: what the points of a tile share for a pulse
     tiles                   points cut into tiles, as kernels/geometry.clh reads them
     transforms              FFTs of rows or columns of arrays that are on a device
