@@ -20,11 +20,11 @@ from ..scattering.scatterers import Points
 from ..scattering.subdivision import Subdivision
 from ._exact_facets import ExactFacets
 from ._facet_spreading import FacetSpreader, TiledFacets
-from ._point_plan import PointPlan, PreparedPoints
-from ._point_spreading import PointSpreader
 from ._unseen_scene import OUTSIDE_BEAM, OUTSIDE_WINDOW
 from .echo_request import EchoRequest
-from .factorized.spreader import FactorizedSpreader
+from .points.direct import PointSpreader
+from .points.factorized import FactorizedSpreader
+from .points.point_plan import PointPlan, PreparedPoints
 from .scene_plan import NODES
 from .spreading import Band, ChannelView, Counts
 

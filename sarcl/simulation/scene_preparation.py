@@ -15,8 +15,8 @@ from ..scattering.scatterers import Points, ShadowRule, facets_of, points_of
 from ..scattering.subdivision import Subdivision
 from ..scene.scene import Scene
 from ._facet_spreading import TiledFacets
-from ._point_plan import PreparedPoints
 from .echo_request import EchoRequest
+from .points.point_plan import PreparedPoints
 from .scene_echoes import SceneEchoes
 from .scene_plan import SHADOWS, ScenePlan, parts_of, samples_shadows
 

@@ -10,7 +10,8 @@ from helpers.devices import as_gpu
 
 import sarcl
 from sarcl.opencl.device import Device
-from sarcl.simulation import _facet_spreading, _point_spreading, spreading
+from sarcl.simulation import _facet_spreading, spreading
+from sarcl.simulation.points import direct
 
 CHIRP = sarcl.Waveform.chirp(center=9.6e9, bandwidth=300e6, duration=1e-6)
 N_PULSES = 80
@@ -73,7 +74,7 @@ def test_rows_that_work_groups_add_up_are_those_of_single_work_items(device, mon
     gpu, made = as_gpu(device), {}
     assert spreading.is_grouped(gpu)
     for grouped in (True, False):
-        monkeypatch.setattr(_point_spreading, "is_grouped", lambda device, grouped=grouped: grouped)
+        monkeypatch.setattr(direct, "is_grouped", lambda device, grouped=grouped: grouped)
         made[grouped] = sarcl.echo(scene, CHIRP, track, check=True, device=gpu, **{"tolerance": 1e-4, **options})
     got, wanted = (made[g].report for g in (True, False))
     assert got.measured_error <= options.get("tolerance", 1e-4)

@@ -18,8 +18,8 @@ from ...numerics.tile_constants import TileConstants
 from ...opencl.device import Device
 from ...opencl.launch_numbers import launch_numbers
 from ..spreading import Counts, most_pulses
-from .levels import FactorizedPlan
-from .point_cells import CellLevel, PointCells
+from ._levels import FactorizedPlan
+from ._point_cells import CellLevel, PointCells
 
 EXPAND, LEAVES = "expand_subapertures.cl", "spread_leaves.cl"
 SPAN, GROUP_SPAN, GROUP = 512, 256, 64  # samples that a work-group of a CPU adds up, and of a GPU; its work-items there

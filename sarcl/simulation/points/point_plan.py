@@ -9,22 +9,22 @@ from typing import Any
 
 import numpy as np
 
-from ..base.boxes import box
-from ..base.errors import NotApplicable
-from ..model.waveform import Waveform
-from ..numerics import cost_model
-from ..numerics.interpolator_choice import choose_interpolator
-from ..numerics.plan import Plan, carrier_steps
-from ..numerics.pulse_geometry import PulseGeometry
-from ..opencl.device import Device
-from ..scattering.antenna_weights import AntennaWeights
-from ..scattering.scatterers import Points
-from ._kernel_images import PatchSamples, sample_patches
-from ._point_spreading import PointSpreader, tiled_points
-from .factorized.levels import FactorizedPlan, plan_levels
-from .factorized.point_cells import PointCells
-from .factorized.spreader import FactorizedSpreader
-from .spreading import Band, ChannelView, TiledScatterers
+from ...base.boxes import box
+from ...base.errors import NotApplicable
+from ...model.waveform import Waveform
+from ...numerics import cost_model
+from ...numerics.interpolator_choice import choose_interpolator
+from ...numerics.plan import Plan, carrier_steps
+from ...numerics.pulse_geometry import PulseGeometry
+from ...opencl.device import Device
+from ...scattering.antenna_weights import AntennaWeights
+from ...scattering.scatterers import Points
+from ..kernel_images import PatchSamples, sample_patches
+from ..spreading import Band, ChannelView, TiledScatterers
+from ._levels import FactorizedPlan, plan_levels
+from ._point_cells import PointCells
+from .direct import PointSpreader, tiled_points
+from .factorized import FactorizedSpreader
 
 WINDOW_DEPTHS = (0, 3, 6)  # depths of cells that are looked for in the range window, coarse ones first
 FEWEST_PULSES = 8  # fewer are not decimated

@@ -18,7 +18,7 @@ from ...numerics.pulse_geometry import PulseGeometry
 from ...numerics.subapertures import Decimation, decimated, filter_error, rates, smooth_runs
 from ...opencl import fft
 from ..spreading import Band
-from .point_cells import CellLevel, PointCells
+from ._point_cells import CellLevel, PointCells
 
 SPACINGS = (1.5, 2.0, 2.5, 3.0, 4.0)  # profile samples per 1/bandwidth
 TAPS = (4, 6, 8)  # taps of the interpolators along range and along the track
