@@ -12,6 +12,7 @@ from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.numerics import cost_model
 from sarcl.reference.equations import point_echo as exact_echo
 from sarcl.simulation import _facet_spreading, echo_check, kernel_images
+from sarcl.simulation.points import direct
 
 CHIRP = sarcl.Waveform.chirp(center=9.6e9, bandwidth=200e6, duration=1e-6)
 WINDOW = {"range_window": (-40.0, 40.0), "reference": (0.0, 0.0, 0.0), "check": False, "tolerance": 1e-3}
