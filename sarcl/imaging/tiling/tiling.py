@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
@@ -68,7 +67,7 @@ class Section:
     orders: Orders
 
 
-class Tiling(ABC):
+class Tiling(Protocol):
     """The tiling of a grid, in bands of tiles. A band is some consecutive rows, or points, of the image.
 
     Fixed by the grid and the side alone, so that results do not depend on how many bands are made at once. Empty
@@ -86,6 +85,9 @@ class Tiling(ABC):
     """
 
     grid: ImageGrid
+    side: int
+    per_tile: int
+    center: np.ndarray
     n_bands: int
     radius: float
     row_shape: tuple[int, ...]
@@ -98,42 +100,33 @@ class Tiling(ABC):
         self.grid, self.side, self.per_tile = grid.filled(), side, side * side
         self.center = grid.bounds.mean(axis=0)
 
-    @abstractmethod
     def extent(self, first: int, last: int) -> slice:
         """Place of bands first ... last - 1 in the flat image (rows of a plane, or points)."""
 
-    @abstractmethod
     def pixels(self, first: int, last: int) -> int:
         """Pixels, padding included, of bands first ... last - 1."""
 
-    @abstractmethod
     def band(self, index: int) -> tuple[Tiles, np.ndarray | None]:
         """Tiles of one band, and their entry of Orders."""
 
-    @abstractmethod
     def tile_sizes(self, first: int, last: int) -> np.ndarray:
         """Pixels, without padding and empty cells, of every tile of bands first ... last - 1."""
 
-    @abstractmethod
     def positions(self, first: int, last: int, orders: Orders) -> np.ndarray:
         """Positions, m (n_tiles, per_tile, 3), of bands first ... last - 1: those of the grid to the bit."""
 
-    @abstractmethod
     def place(self, values: np.ndarray, run: Run, start: int, orders: Orders, flat: FlatImage) -> None:
         """Write values (n,) of tiles from `start` on of a run of bands to their pixels in the flat image.
 
         The tiles are all of the run, or some of a run of one band.
         """
 
-    @abstractmethod
     def outline(self) -> np.ndarray:
         """Sample points, m (n, 3), of the region of all pixels, at which errors are estimated."""
 
-    @abstractmethod
     def tree(self, first: int, last: int, factors: Sequence[int]) -> Tree:
         """Tree over bands first ... last - 1; `factors`: leaves along a side of a tile of each level, the last 1."""
 
-    @abstractmethod
     def parts(self, run: Run, factor: int, most: Callable[[int], int], whole: bool) -> Iterator[Part]:
         """A run of bands in parts of whole roots, or of roots cut to some bands, of `factor` leaves per side.
 
@@ -141,44 +134,34 @@ class Tiling(ABC):
         whole  all can be made at a time
         """
 
-    @abstractmethod
     def sections(self, parts: Iterable[Part], factors: Sequence[int]) -> Iterator[Section]:
         """Parts with their trees; `factors` as of `tree`."""
 
-    @abstractmethod
     def place_section(self, device: Device, sums: Buffer, section: Section, flat: FlatImage) -> None:
         """Write compensated sums (4, pixels) on the device to the pixels of a section in the flat image."""
 
-    @abstractmethod
     def n_roots(self, first: int, last: int, factor: int) -> int:
         """Roots of `factor` leaves per side in bands first ... last - 1."""
 
-    @abstractmethod
     def part_size(self, part: Part, factor: int) -> tuple[int, int]:
         """Roots and pixels, padding included, of a part; of listed points an upper bound of the pixels."""
 
-    @abstractmethod
     def root_bands(self, factor: int) -> int:
         """Bands that a root of `factor` leaves per side reaches over."""
 
-    @abstractmethod
     def root_leaves(self, factor: int, bands: int) -> int:
         """Leaves of a root of `factor` leaves per side, cut to so many bands, at most."""
 
-    @abstractmethod
     def leaf_radius(self, side: int) -> float:
         """Largest distance of a pixel from the centre of a leaf of that side, m, about."""
 
-    @abstractmethod
     def level_radii(self, factors: Sequence[int]) -> list[float]:
         """Largest distance of a pixel from the centre of its tile, m, for each level; `factors` as of `tree`."""
 
-    @abstractmethod
     def child_distance(self, radius: float, below: float) -> float:
         """Largest distance between the centres of a tile of `radius` and of its children, whose radius is `below`."""
 
     @property
-    @abstractmethod
     def longest_side(self) -> int:
         """Pixels along the longer side of the image, about."""
 
