@@ -13,12 +13,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base import validation, wgs84
+from ..base.types import PathLike
 from ..io import elevation
 from ..io.elevation import Geoid
 from ._grid_index import Axes, Curvilinear
-
-if TYPE_CHECKING:
-    from ..base.types import PathLike
 
 FARTHEST = 1e6  # degrees: more is no place
 SAME = 1e-9  # distance to a point, in cells, below which a position is at it

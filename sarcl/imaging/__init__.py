@@ -27,5 +27,4 @@ For other folders:
 For this folder alone:
 
     _row_coverage    which rows saw a pixel, and the sum of their weights: the gain of the image
-    _rows_in_phase   errors of interpolation that add up in phase over a few rows
 """

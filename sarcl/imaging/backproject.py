@@ -187,8 +187,8 @@ class BackprojectPlan:
             where, remedy = ("range window", "") if skipped.beam == 0 else ("range window and beam", " and the beam")
             log.warning(NOTHING_SEEN, where, remedy)
         unseen = unseen_pixels(task)
-        if unseen and unseen.warning and done:
-            warn(unseen.warning)
+        if unseen and unseen.warning() and done:
+            warn(unseen.warning())
         pairs, seconds = CHECKED * task.raw.n_rows * self.raw.n_samples, clock.seconds.get("backproject", 0.0)
         measured = self.options.measured(pairs, seconds, clock, lambda: _measure_error(task, grid, output.data))
         gain = self._gain(done)

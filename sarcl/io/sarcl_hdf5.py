@@ -58,9 +58,7 @@ def load(path: PathLike, make: Make[T], autofocus: bool = False, external: bool 
         try:
             if not external:
                 _hdf5_safety.check_links(file)
-            dataset = file[rows]
-            if sums is not None and sums.rows is not None:
-                dataset = _with_checksums(dataset, sums)
+            dataset = _with_checksums(file[rows], sums)
             fields = {**hdf5.get_all(file, leave=("report", rows)), rows: dataset, "report": hdf5.get_report(file)}
             return make(kind, fields)
         except _hdf5_safety.Refused as exc:
@@ -80,12 +78,7 @@ def open_rows(path: PathLike, name: str) -> h5py.Dataset:
     ValueError where the file is damaged, OSError or KeyError where there is no such file or dataset.
     """
     sums = _verify_checksums(path)
-    dataset = _open_file(path)[name]
-    return (
-        dataset
-        if sums is None or sums.rows is None or sums.rows[0] != name.strip("/")
-        else _with_checksums(dataset, sums)
-    )
+    return _with_checksums(_open_file(path)[name], sums)
 
 
 def _verify_checksums(path: PathLike) -> _checksums.Checksums | None:
@@ -108,10 +101,12 @@ def _open_file(path: PathLike) -> h5py.File:
         raise ValueError(f"{str(path)!r} is {what} ({exc}); copy it again or give a file saved by sarcl") from None
 
 
-def _with_checksums(dataset: h5py.Dataset, sums: _checksums.Checksums) -> h5py.Dataset:
+def _with_checksums(dataset: h5py.Dataset, sums: _checksums.Checksums | None) -> h5py.Dataset:
+    """The dataset, with the checksums that a file has for it."""
     from ._checked_rows import CheckedRows
 
-    return CheckedRows(dataset, sums)
+    has_sums = sums is not None and sums.rows is not None and sums.rows[0] == dataset.name.strip("/")
+    return CheckedRows(dataset, sums) if sums is not None and has_sums else dataset
 
 
 def job_of(path: PathLike) -> str | None:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypedDict
+from typing import TypedDict
 
 import numpy as np
+from numpy.typing import ArrayLike, DTypeLike
 
 from ..base import validation
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, DTypeLike
 
 # optional arrays with one entry per row: name -> (dtype, trailing shape)
 PER_ROW: dict[str, tuple[DTypeLike, tuple[int, ...]]] = {

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, cast
+from typing import Literal, cast
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..base import validation
+from ..base.types import LazyRows
 from .waveform import Waveform
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from ..base.types import LazyRows
 
 LONGEST_DELAY = 1e9  # s, of a start: no echo takes as long
 ROUNDING = 1e-9  # relative difference of frequencies that count as equal

@@ -23,7 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from fractions import Fraction
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -31,11 +31,9 @@ from ..base import validation
 from ..base.constants import SPEED_OF_LIGHT
 from ..base.errors import warn
 from ..base.rows import spread_over
+from ..base.types import LazyRows
 from ._time_record import ROUNDING, Signal, Sweep, TimeRecord, signal_of
 from .waveform import Waveform
-
-if TYPE_CHECKING:
-    from ..base.types import LazyRows
 
 BLOCK = 2**20  # samples per block of rows
 BEAT_ROWS = 16  # rows in which the sign of the beat is checked

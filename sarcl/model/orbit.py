@@ -5,12 +5,13 @@ from __future__ import annotations
 import datetime
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base import arguments, validation
+from ..base.types import PathLike
 from ..earth import rotation, viewing, zero_doppler
 from ..earth.elevation import ElevationModel
 from ..earth.kepler import KeplerElements
@@ -20,9 +21,6 @@ from ..io import orbit_files
 from ._orbit_arguments import Attitude, axes_of, ellipse, places, span_of, together
 from .dates import Date, date, seconds
 from .trajectory import BYTES_PER_PULSE, Trajectory
-
-if TYPE_CHECKING:
-    from ..base.types import PathLike
 
 LINES_DAYS = 1.0  # days before and after the epoch of two-line elements, whose error grows by kilometres per day
 ROUNDING = 1e-9  # s: a time outside the span by less counts as its end

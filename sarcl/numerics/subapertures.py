@@ -133,14 +133,14 @@ def rates(track: PulseGeometry, points: np.ndarray, axes: np.ndarray | None, mos
 
 def filter_error(
     track: PulseGeometry,
-    made: Decimation,
+    decimation: Decimation,
     centers: np.ndarray,
     radius: float,
     frequency: float,
     axes: np.ndarray | None = None,
     directions: np.ndarray | None = None,
 ) -> float:
-    """Largest relative error of a pulse made from the kept ones, `radius` m away from each of `centers`, m (m, 3).
+    """Largest relative error of a pulse that the kept ones make, `radius` m away from each of `centers`, m (m, 3).
 
     axes        unit vectors (2, 3) of the plane in which points lie;  directions  of points from the centres, unit
                 vectors (n, 3), in place of those along the coordinates, or in the plane
@@ -152,28 +152,29 @@ def filter_error(
     if axes is not None:
         angle = 2 * np.pi * np.arange(8) / 8
         directions = np.cos(angle)[:, None] * axes[0] + np.sin(angle)[:, None] * axes[1]
-    blocks = made.blocks
+    blocks = decimation.blocks
     spread = spread_over(len(blocks), 32)
-    within = spread_over(made.ratio, 64)
+    within = spread_over(decimation.ratio, 64)
     usual = (blocks[spread, :1] + np.minimum(within, blocks[spread, 1:2] - 1)).ravel()
-    pulses = np.unique(np.concatenate([usual, _roughest(track, made, centers[len(centers) // 2])]))
+    pulses = np.unique(np.concatenate([usual, _roughest(track, decimation, centers[len(centers) // 2])]))
     block = blocks[np.searchsorted(blocks[:, 0], pulses, side="right") - 1]
-    kept = block[:, 2:3] + np.arange(made.filter.shape[1])
-    filters, worst = made.filter.astype(np.float64)[block[:, 3] + pulses - block[:, 0]], 0.0
+    kept = block[:, 2:3] + np.arange(decimation.filter.shape[1])
+    filters, worst = decimation.filter.astype(np.float64)[block[:, 3] + pulses - block[:, 0]], 0.0
     for center in centers:
         points = center + radius * directions
         exact = _phases(track, pulses, points, center, frequency)
-        phases = _phases(made.kept, kept, points, center, frequency)
+        phases = _phases(decimation.kept, kept, points, center, frequency)
         worst = max(worst, float(np.abs(np.einsum("pn,pnm->pm", filters, phases) - exact).max()))
     return worst
 
 
-def _roughest(track: PulseGeometry, made: Decimation, center: np.ndarray, most: int = 1024) -> np.ndarray:
+def _roughest(track: PulseGeometry, decimation: Decimation, center: np.ndarray, most: int = 1024) -> np.ndarray:
     """Pulses whose direction from `center` deviates most from linear interpolation between the kept pulses."""
-    first, count, before = made.blocks[:, 0], made.blocks[:, 1], made.blocks[:, 2] + made.filter.shape[1] // 2 - 1
-    way = ((np.arange(len(track)) - np.repeat(first, count)) / made.ratio)[:, None]
+    first, count, row, _ = decimation.blocks.T
+    before = row + decimation.filter.shape[1] // 2 - 1
+    way = ((np.arange(len(track)) - np.repeat(first, count)) / decimation.ratio)[:, None]
     before, off = np.repeat(before, count), np.zeros(len(track))
-    for antenna, ends in zip(track.ends, made.kept.ends, strict=True):
+    for antenna, ends in zip(track.ends, decimation.kept.ends, strict=True):
         pulses, kept = _directions(antenna, center), _directions(ends, center)
         apart = pulses - (1 - way) * kept[before] - way * kept[before + 1]
         off = np.maximum(off, dot(apart, apart))

@@ -77,14 +77,10 @@ def _narrow_phase(v: np.ndarray) -> np.ndarray:
     n = len(v)
     phase = np.zeros(n)
     for k in range(PASSES):
-        widths = [max(n / 2 ** (k + i / 2), _phase_gradient.NARROWEST) for i in range(8)]
-        width = max(n / 4**k, WINDOW)
         blurred = _phase_gradient.turned(v, phase)
-        starts = [np.zeros(n), _phase_gradient.gradient(blurred, widths)]
-        levels = [_phase_gradient.sharpness(blurred, start, width) for start in starts]
-        step = _phase_gradient.sharpen(blurred, starts[int(np.argmax(levels))], width)
+        step, gain = _phase_gradient.focused(blurred, blurred, k, WINDOW)
         phase = phase + step
-        if width <= WINDOW and _phase_gradient.sharpness(blurred, step, width) < ENOUGH * levels[0]:
+        if n / 4**k <= WINDOW and gain < ENOUGH:
             break
     return phase
 

@@ -41,20 +41,14 @@ def _narrow(view: ApertureView, errors: Errors, ranges: bool, passes: int) -> Er
     from them: by phase gradient autofocus, then by sharpness.
     """
     n, lags = view.n, LAGS if ranges else NO_LAG
-    zero = np.zeros(n)
     for k in range(passes):
         places = view.brightest(errors, max(n / 2 / 4**k, APART if ranges else 8.0))
         v = view.contributions(errors, places, lags)
         flat = v.reshape(n, -1)
-        widths = [max(n / 2 ** (k + i / 2), _phase_gradient.NARROWEST) for i in range(8)]
-        width = max(n / 4**k, WINDOW)
-        starts = [zero, _phase_gradient.gradient(v[:, :, len(lags) // 2], widths)]
-        levels = [_phase_gradient.sharpness(flat, start, width) for start in starts]
-        step = _phase_gradient.sharpen(flat, starts[int(np.argmax(levels))], width)
-        gain = _phase_gradient.sharpness(flat, step, width) / max(levels[0], 1e-300)
+        step, gain = _phase_gradient.focused(flat, v[:, :, len(lags) // 2], k, WINDOW)
         cells = np.zeros(n)
         if ranges:
-            cells = _phase_gradient.range_shift(v, step, width, min(RANGE_MODES, n // 8)) / 2
+            cells = _phase_gradient.range_shift(v, step, max(n / 4**k, WINDOW), min(RANGE_MODES, n // 8)) / 2
         errors = view.shift_removed((errors[0] + step, errors[1] + cells * view.cell))
         log.debug("pass %d: %d places, sharpness x %.4f, range %.3f cells", k, len(places), gain, abs(cells).max())
         if gain < ENOUGH and abs(cells).max() < MOVED:

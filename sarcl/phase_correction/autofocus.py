@@ -149,8 +149,8 @@ def autofocus(
     tick = _ticker(progress, _search.searches(view, bool(range_errors)) + 2)
     errors = _search.search(view, bool(range_errors), tick)
     unseen = unseen_pixels(make_task(weighted, grid, None, None, False, True, beam, True))
-    if unseen and unseen.warned(wraps=False):
-        warn(unseen.warned(wraps=False))
+    if unseen and unseen.warning(wraps=False):
+        warn(unseen.warning(wraps=False))
     errors, tests = _hold_out.cross_validated(view, errors, tick)
     if not tests["found"]:
         log.warning("no correction by autofocus passed cross-validation; the data are unchanged: %s", tests["reason"])

@@ -191,7 +191,7 @@ class Scenario:
         """Arguments of `add_noise`; ValueError, before echoes are computed, where they are not one level."""
         if self.noise is None:
             return {}
-        from ..effects.noise_level import level_of
+        from ..effects.noise import level_of
 
         level = Builder(self).options("noise", {})
         with self.where.blame(("noise",), level):

@@ -8,8 +8,8 @@ import pytest
 import sarcl
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.imaging import choose_method, profile_energy
-from sarcl.imaging._rows_in_phase import RowsInPhase
 from sarcl.imaging.focusing_task import make_task
+from sarcl.imaging.profile_energy import RowsInPhase
 from sarcl.numerics import interpolation, interpolator_choice
 from sarcl.opencl import fft
 

@@ -18,8 +18,8 @@ from ..antenna_beam import AntennaOnDevice
 from ..engine import DirectEngine, RowProfiles, Skipped
 from ..focusing_task import FocusingTask
 from ..pixel_taper import TaperOnDevice
-from ..tiling.lines import LineTiling
 from ..tiling.of_grid import tiling_of
+from ..tiling.plane import LineTiling
 from ..tiling.tiling import FlatImage, Tiling
 from . import _shared_line_plan, line_plan
 from .line_plan import LinePlan

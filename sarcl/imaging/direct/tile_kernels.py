@@ -19,7 +19,7 @@ from ...numerics.tiles import Tiles
 from ...opencl.device import Buffer, Device
 from ...opencl.launch_numbers import launch_numbers
 from ..pixel_taper import WEIGHT_BUFFERS
-from ..tiling.lines import LineTiling
+from ..tiling.plane import LineTiling
 from ..tiling.tiling import Tiling
 from . import _shared_line_plan, line_plan
 from ._line_curvature import steps

@@ -22,8 +22,7 @@ from ..direct.direct import Direct
 from ..direct.tile_kernels import Block, KernelForm, Profiles, Pulses, TilesOnDevice, kernel_of
 from ..engine import Engine, RowProfiles, Skipped
 from ..focusing_task import FocusingTask
-from ..tiling.tiling import FlatImage, Roots, Tiling
-from ..tiling.tree import Tree
+from ..tiling.tiling import FlatImage, Roots, Tiling, Tree
 from ._memory import MemoryPlan
 from ._tile_coverage import TileCoverage, coverage_of, same_coverage, without
 from .plan import GUARD, FactorPlan, Level, moving_cost

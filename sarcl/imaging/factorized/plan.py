@@ -22,8 +22,8 @@ from ..direct import line_plan
 from ..direct.line_plan import LinePlan
 from ..direct.tile_kernels import CHUNK
 from ..focusing_task import FocusingTask
-from ..tiling.lines import LineTiling
 from ..tiling.of_grid import tiling_of
+from ..tiling.plane import LineTiling
 from ..tiling.tiling import Tiling
 from ._tile_chains import chains, runs_of
 

@@ -105,32 +105,32 @@ class ImageRows:
         shape = len(plan.times), len(plan.ranges)
         self._by_sums = plan.sums_pay(shape[0], self._period)
         if self._by_sums:
-            self._made = np.zeros(shape, np.complex128)
+            self._totals = np.zeros(shape, np.complex128)
         else:
-            self._made = host_memory.zeros(
+            self._totals = host_memory.zeros(
                 (self._period, shape[1]), budget.host / ARRAYS, "Doppler bins of the columns"
             )
 
-    def add(self, numbers: np.ndarray, columns: slice, made: np.ndarray) -> None:
+    def add(self, numbers: np.ndarray, columns: slice, values: np.ndarray) -> None:
         """Add values complex64 (n, n_columns) of Doppler bins (n,) in some columns."""
         period = self._period
         if self._by_sums:
-            self._made[:, columns] += sums(made, numbers, np.arange(len(self._made)), period, 1)
+            self._totals[:, columns] += sums(values, numbers, np.arange(len(self._totals)), period, 1)
             return
         for a, b in _pieces(numbers, period):
-            self._made[numbers[a] % period : numbers[a] % period + b - a, columns] += made[a:b]
+            self._totals[numbers[a] % period : numbers[a] % period + b - a, columns] += values[a:b]
 
     def rows(self, level: np.ndarray) -> np.ndarray:
         """The image complex64 (times, ranges), times a level of each column."""
         level = level.astype(np.complex64)
         if self._by_sums:
-            return (self._made * level).astype(np.complex64)
+            return (self._totals * level).astype(np.complex64)
         n_times, n_ranges = len(self.plan.times), len(self.plan.ranges)
         image = np.empty((n_times, n_ranges), np.complex64)
-        width = _columns(self._made, self._budget)
+        width = _columns(self._totals, self._budget)
         for start in range(0, n_ranges, width):
             columns = slice(start, start + width)
-            profiles = fft.rows(None, np.ascontiguousarray(self._made[:, columns].T), inverse=True)
+            profiles = fft.rows(None, np.ascontiguousarray(self._totals[:, columns].T), inverse=True)
             image[:, columns] = profiles[:, :n_times].T * level[columns]
         return image
 
@@ -166,9 +166,9 @@ def _spectra(plan: FocusPlan, rows: np.ndarray, budget: Budget) -> np.ndarray:
     return out
 
 
-def _columns(held: np.ndarray, budget: Budget) -> int:
+def _columns(array: np.ndarray, budget: Budget) -> int:
     """Columns that are transformed at a time: few for the cache, more where each pass reads a file again."""
-    return max(PIECE, int(budget.host / (32 * len(held)))) if isinstance(held, np.memmap) else PIECE
+    return max(PIECE, int(budget.host / (32 * len(array)))) if isinstance(array, np.memmap) else PIECE
 
 
 def _pieces(numbers: np.ndarray, period: int) -> list[tuple[int, int]]:

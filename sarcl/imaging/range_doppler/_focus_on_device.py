@@ -79,13 +79,13 @@ class Room:
     """Arrays and blocks that fit on a device.
 
     spectra, folded  whether the rows and their spectra stay there, and the compressed Doppler bins
-    work     bytes for the rows of a transform;  left  for blocks of all else;  bins  Doppler bins at a time
+    work     bytes for the rows of a transform;  remainder  for blocks of all else;  bins  Doppler bins at a time
     """
 
     spectra: bool
     folded: bool
     work: float
-    left: float
+    remainder: float
     bins: int
 
     @classmethod
@@ -160,7 +160,7 @@ class _Array:
                 transforms.columns(self.buffer, (n_rows, width), first, count)
                 transforms.lay(self.buffer, width, first, count, weights, 0, sign)
             return
-        at_once = max(1, min(transforms.most, int(room.left // (8 * (n_rows + n)))))
+        at_once = max(1, min(transforms.most, int(room.remainder // (8 * (n_rows + n)))))
         for first in range(0, width, at_once):
             part = np.ascontiguousarray(self.host[:n_rows, first : first + at_once])
             count = part.shape[1]
@@ -180,7 +180,7 @@ def _refer(job: Job, rows: _Array, weigher: WeightedSamples, room: Room) -> bool
     """Weighted rows of one reference range, made on the device; False where it may not hold their sums."""
     raw = job.raw
     rows.buffer = job.device.empty(8 * rows.shape[0] * rows.shape[1])
-    at_once = max(1, int(min(room.left, UPLOAD) // weigher.row_bytes))
+    at_once = max(1, int(min(room.remainder, UPLOAD) // weigher.row_bytes))
     with Pipeline(job.device) as pipeline:
         for start in range(0, raw.n_rows, at_once):
             stop = min(start + at_once, raw.n_rows)

@@ -244,11 +244,11 @@ def mark(job: dict[str, Any]) -> str:
     return checksum(json.dumps(job, sort_keys=True))
 
 
-def difference(there: dict[str, Any], here: dict[str, Any]) -> str:
+def difference(stored: dict[str, Any], job: dict[str, Any]) -> str:
     """The differences between two jobs, in words."""
     differences = []
-    for name, value in here.items():
-        if there.get(name) != value:
+    for name, value in job.items():
+        if stored.get(name) != value:
             plain = name in ("sarcl", "method", "tolerance", "pixels", "wrap", "skip")
-            differences.append(f"{name} was {there.get(name)}, is {value}" if plain else f"other {name}")
+            differences.append(f"{name} was {stored.get(name)}, is {value}" if plain else f"other {name}")
     return "; ".join(differences) or "other options"

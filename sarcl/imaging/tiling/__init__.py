@@ -2,11 +2,9 @@
 
 For other folders:
 
-    lines        the tiling of planes for lines of pixels
     of_grid      tiling_of(): the tiling of a grid
-    plane        the tiling of planes
-    tiling       what every tiling offers; parts and sections of it
-    tree         quadtree of tiles
+    plane        the tilings of planes, for pixels and for lines of them
+    tiling       what every tiling offers; parts and sections of it, and their quadtrees
 
 For this folder alone:
 

@@ -12,8 +12,7 @@ from ...base.morton import morton_order
 from ...model.image_grid import ImageGrid
 from ...numerics.tiles import Tiles, tile_points
 from ...opencl.device import Buffer, Device
-from .tiling import FlatImage, Orders, Part, Roots, Run, Section, Tiling
-from .tree import Tree
+from .tiling import FlatImage, Orders, Part, Roots, Run, Section, Tiling, Tree
 
 KEPT = 2**25  # points of a grid whose order is kept, in 4 bytes each
 
