@@ -124,13 +124,7 @@ def _result(
 ) -> dict[str, Any]:
     """The entry of a case in the document, measured."""
     rows = measure(
-        case,
-        competitors,
-        repeats=effort.repeats,
-        limit=effort.limit,
-        paces=paces,
-        patience=effort.patience,
-        tick=tick,
+        case, competitors, repeats=effort.repeats, limit=effort.limit, paces=paces, patience=effort.patience, tick=tick
     )
     norm = float(np.linalg.norm(case.wanted)) / case.norm
     setting = {"scene": case.scene, "data": case.data, "n": case.n, "pairs": case.pairs, "pixels": effort.pixels}

@@ -8,13 +8,7 @@ import numpy as np
 
 from ..base.constants import SPEED_OF_LIGHT
 from ..base.vectors import unit
-from ..scattering.physical_optics import (
-    UP,
-    _nodes,
-    normals_and_areas,
-    scattering_matrix,
-    triangle_integral,
-)
+from ..scattering.physical_optics import UP, _nodes, normals_and_areas, scattering_matrix, triangle_integral
 from .geometry import half_path
 
 
