@@ -80,11 +80,13 @@ class Section:
     """A section as it grows: rows, blocks of the page, and numbers for JSON.
 
     texts  its paragraphs, and for each item of a row a table of published value, source, criterion and remarks
+    words  what stands in the {} of texts, beside the words of a call
     """
 
     key: str
     title: str
     texts: dict[str, Any] = field(default_factory=dict)
+    words: dict[str, object] = field(default_factory=dict)
     rows: list[Row] = field(default_factory=list)
     parts: list[Block] = field(default_factory=list)
     numbers: dict[str, Any] = field(default_factory=dict)
@@ -92,9 +94,9 @@ class Section:
 
     @classmethod
     def of(cls, paper: str, key: str, **words: object) -> Section:
-        """A section with the texts of its paper's file; words fill those of its title."""
+        """A section with the texts of its paper's file; words fill all of them."""
         texts = _texts(paper)[key]
-        return cls(key, texts["title"].format(**words), texts)
+        return cls(key, texts["title"].format(**words), texts, words)
 
     def number(self, item: str, measured: float, **words: Any) -> None:
         """A row that holds where `measured` lies `within` so much of the expected number; words: as `states` has them,
@@ -112,7 +114,11 @@ class Section:
         word that is called as a text stands in its place.
         """
         texts = {"item": item, "source": "", **self.texts.get(item, {})}
-        filled = {name: text.format(value=value, **words) for name, text in texts.items() if isinstance(text, str)}
+        filled = {
+            name: text.format(value=value, **self.words | words)
+            for name, text in texts.items()
+            if isinstance(text, str)
+        }
         row = {name: text for name, text in {**filled, **words}.items() if name in ROW_TEXTS}
         self.rows.append(
             Row(**row | {"cause": "" if holds else row.get("cause", "")}, holds=bool(holds), value=plain(value))
@@ -120,7 +126,7 @@ class Section:
 
     def say(self, key: str = "text", **words: object) -> None:
         """A paragraph of the paper's file, with the words in its {}."""
-        self.parts.append(html.words(self.texts[key].format(**words)))
+        self.parts.append(html.words(self.texts[key].format(**self.words | words)))
 
     def list(self, key: str = "errors") -> None:
         """A list of paragraphs of the paper's file."""
@@ -132,7 +138,7 @@ class Section:
 
     def _figure(self, key: str, words: Mapping[str, object]) -> dict[str, Any]:
         """Texts of a figure or table of the paper's file: names of axes or a head, and a caption."""
-        texts = {"caption": "", **self.texts["figures"][key]}
+        texts, words = {"caption": "", **self.texts["figures"][key]}, self.words | dict(words)
         head = [text.format(**words) for text in texts.pop("head", [])]
         return {name: text.format(**words) for name, text in texts.items()} | {"head": head}
 

@@ -31,31 +31,19 @@ def steady(lab: Lab) -> Section:
         case, name = system(n, step, mirrored=False), f"N {n}, {step / 1e6:+g} MHz"
         actual, mapped = lab.mapped(case, "corrected"), lab.mapped(case, "apparent")
         y = mapped.tx[:, 1]
-        out.number("{name}: length", float(np.ptp(y)), name=name, figure=figure)
+        out.words = {"name": name, "figure": figure}
+        out.number("{name}: length", float(np.ptp(y)))
         shift = float((y - actual.tx[:, 1]).mean())
         direction = "negative" if step > 0 else "positive"
         if n > 45:
-            out.states(
-                "{name}: places are moved",
-                shift,
-                (shift < 0) == (step > 0),
-                name=name,
-                figure=figure,
-                direction=direction,
-            )
+            out.states("{name}: places are moved", shift, (shift < 0) == (step > 0), direction=direction)
         nulls = [lab.measure(raw)["null"] for raw in (actual, mapped)]
         remark = "" if step > 0 else (
             f"the mapping changes nothing, but the centre frequency is now {case.middle / 1e9:.2f} GHz (section "
             f"5.3.1), whose wave resolves {case.null:.3f} m over 430 m; figure 5.5 wants f0 moved as well"
         )  # fmt: skip
-        out.number("{name}: nulls in cross-range", nulls[1], expected=PRINTED, why=remark, name=name, figure=figure)
-        out.states(
-            "{name}: nulls before and after the mapping",
-            nulls,
-            abs(nulls[0] - nulls[1]) < 0.002,
-            name=name,
-            figure=figure,
-        )
+        out.number("{name}: nulls in cross-range", nulls[1], expected=PRINTED, why=remark)
+        out.states("{name}: nulls before and after the mapping", nulls, abs(nulls[0] - nulls[1]) < 0.002)
         curves.append((name, actual.tx[::THIN, 1], y[::THIN]))
         if n == 45:
             curves.insert(0, ("actual", actual.tx[::THIN, 1], actual.tx[::THIN, 1]))
@@ -82,21 +70,18 @@ def switched(lab: Lab) -> Section:
         wide = float(np.ptp(lab.mapped(other, "apparent").tx[:, 1]))
         lengths = {o: float(np.ptp(m.tx[:, 1])) for o, m in mapped.items()}
         length_by_paper = lengths["published"]
-        out.number("{name}: apparent length", length_by_paper, source=figure, expected=length, name=name)
-        out.number(
-            "{name}: longer by", 100 * (length_by_paper / case.aperture - 1), source=figure, expected=growth, name=name
-        )
+        growth_by_paper = 100 * (length_by_paper / case.aperture - 1)
+        out.words = {"name": name}
+        out.number("{name}: apparent length", length_by_paper, source=figure, expected=length)
+        out.number("{name}: longer by", growth_by_paper, source=figure, expected=growth)
         table.append([name, f"{length:.0f}", f"{length_by_paper:.1f}", f"{wide:.1f}", f"{lengths['halved']:.1f}"])
-        out.keep(
-            **{
-                name: {
-                    "printed": length,
-                    "half a wave of fc": length_by_paper,
-                    "d 0.015 m": wide,
-                    "halved": lengths["halved"],
-                }
-            }
-        )
+        named = {
+            "printed": length,
+            "half a wave of fc": length_by_paper,
+            "d 0.015 m": wide,
+            "halved": lengths["halved"],
+        }
+        out.keep(**{name: named})
         gap = float(np.diff(mapped["published"].tx[:, 1]).max())
         if n == 45:
             out.states("switched aperture", gap, gap > 2 * _step(raw.tx), source=figure)

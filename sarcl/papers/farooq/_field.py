@@ -34,13 +34,8 @@ def delays(lab: Lab) -> Section:
         if degrees:
             delay = 1e9 * t[level.argmax()]
             figure = "4.11" if degrees > 0 else "4.12"
-            out.number(
-                "delay of the peak at {degrees:+d} deg, closed form",
-                delay,
-                expected=PRINTED * np.sign(degrees),
-                degrees=degrees,
-                figure=figure,
-            )
+            out.words = {"degrees": degrees, "figure": figure}
+            out.number("delay of the peak at {degrees:+d} deg, closed form", delay, expected=PRINTED * np.sign(degrees))
     peak = float(exact_curves[2][2].max())
     bound = closed.quadratic_phase(shape=(N, 1), spacing=(HALF_WAVE, 0), frequency_step=(STEP, 0), cosines=(1, 0))
     out.states("the same in the exact field: a peak at +45 deg", peak, peak > 0.9 * N, n=N, ratio=bound / (np.pi / 4))
@@ -64,16 +59,10 @@ def _systems(out: Section, lab: Lab) -> None:
         modulus = np.abs(beam(array, F0, times=times, positions=positions, device=lab.device))[:, 0]
         delay = float(t[modulus.argmax()])
         offset = SPEED_OF_LIGHT / 2 * (delay - plain)
+        longer = delay / plain
+        out.words = {"n": n, "mhz": step / 1e6, "ns": 1e9 * delay, "printed_ns": 1e9 * plain, "range_mm": 1e3 * offset}
         out.states(
-            "delay at the aperture's end, N {n}, {mhz:g} MHz",
-            delay / plain,
-            abs(delay / plain - 1) < 0.02,
-            n=n,
-            mhz=step / 1e6,
-            ns=1e9 * delay,
-            more=100 * (delay / plain - 1),
-            printed_ns=1e9 * plain,
-            range_mm=1e3 * offset,
+            "delay at the aperture's end, N {n}, {mhz:g} MHz", longer, abs(longer - 1) < 0.02, more=100 * (longer - 1)
         )
         rows.append([f"N {n}, {step / 1e6:g} MHz", f"{delay / plain:.4f}", f"{predicted / plain:.4f}",
                      f"{1e3 * offset:.0f}", f"{modulus.max() / n:.4f}"])  # fmt: skip

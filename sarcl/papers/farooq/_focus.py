@@ -23,6 +23,8 @@ def section(lab: Lab) -> Section:
             continue
         case = system(n, step, mirrored=False)
         name = f"N {n}, {step / 1e6:g} MHz"
+        sources = ("figure 5.1", "figure 5.2") if n == 45 else ("section 5.1", "section 5.1")
+        out.words = {"name": name}
         raw = lab.mapped(case, None)
         places, values = lab.cut(raw)
         lost = float(20 * np.log10(values.max()))
@@ -30,40 +32,17 @@ def section(lab: Lab) -> Section:
         wide = lab.measure(raw)["irw"]
         linear, full = (lab.measure(lab.mapped(case, "corrected", quadratic=q)) for q in (False, True))
         range_null = lab.measure(lab.mapped(case, "corrected"), 0)["null"]
-        out.states(
-            "unmodified, {name}",
-            [lost, where, wide],
-            lost < -3,
-            source="figure 5.1" if n == 45 else "section 5.1",
-            name=name,
-            offset=abs(where),
-        )
-        out.number(
-            "corrected, {name}: nulls in cross-range",
-            full["null"],
-            source="figure 5.2" if n == 45 else "section 5.1",
-            expected=PRINTED,
-            name=name,
-        )
+        out.states("unmodified, {name}", [lost, where, wide], lost < -3, source=sources[0], offset=abs(where))
+        out.number("corrected, {name}: nulls in cross-range", full["null"], source=sources[1], expected=PRINTED)
         if n == 45:
-            out.number("corrected, {name}: nulls in range", range_null, expected=PRINTED, name=name)
+            out.number("corrected, {name}: nulls in range", range_null, expected=PRINTED)
         off = abs(linear["null"] - PRINTED) > 0.002 or linear["level_db"] < -0.3
-        phase = closed.quadratic_phase(
-            shape=(n, 1),
-            spacing=(case.step, 0),
-            frequency_step=(step, 0),
-            cosines=(np.sin(np.arctan(case.aperture / 2 / case.distance)), 0),
-        )
-        out.states(
-            "equations 5.4 and 5.5 alone, {name}",
-            [linear["null"], linear["level_db"], linear["pslr_db"]],
-            not off,
-            why=""
-            if not off
-            else f"they leave the quadratic phase of the elements, {phase:.1f} rad at the aperture's "
-            "end; it must be taken out frequency by frequency",
-            name=name,
-        )
+        cosines = np.sin(np.arctan(case.aperture / 2 / case.distance)), 0
+        steps = {"spacing": (case.step, 0), "frequency_step": (step, 0)}
+        phase = closed.quadratic_phase(shape=(n, 1), cosines=cosines, **steps)
+        why = {} if off else {"why": ""}
+        value = [linear["null"], linear["level_db"], linear["pslr_db"]]
+        out.states("equations 5.4 and 5.5 alone, {name}", value, not off, phase=phase, **why)
         table.append([name, f"{lost:.1f}", f"{phase:.2f}", f"{linear['null']:.3f}", f"{linear['level_db']:.2f}",
                       f"{linear['pslr_db']:.1f}", f"{full['null']:.3f}", f"{full['pslr_db']:.1f}"])  # fmt: skip
         for quadratic, label in ((True, "corrected"), (False, "linear part")):

@@ -28,33 +28,19 @@ def section(lab: Lab) -> Section:
         plain, apparent, own = (rows[k] for k in (experiment.CONVENTIONAL, "apparent", "channels"))
         shifts = [p["error"] for p in apparent["points"]]
         off = max(shifts, key=abs)
-        out.states(
-            "{name}: places of points 2 and 2.25 m off",
-            shifts,
-            abs(off) < 0.1 * plain["points"][0]["null"],
-            pslr=[p["pslr_db"] for p in apparent["points"]],
-            name=name,
-        )
+        out.words = {"name": name, "separation": SEPARATIONS[0], "rule": rule(result["null"])}
+        lobes, limit = [p["pslr_db"] for p in apparent["points"]], 0.1 * plain["points"][0]["null"]
+        out.states("{name}: places of points 2 and 2.25 m off", shifts, abs(off) < limit, pslr=lobes)
         least = [row["told_apart"] for row in (apparent, plain)]
         largest = _reason(apparent["dips"][-1], result["null"])
         dips = [
             next(d["dip_db"] for d in row["dips"] if d["separation"] == SEPARATIONS[0]) for row in (apparent, plain)
         ]
-        out.states(
-            "{name}: two points resolved",
-            least,
-            experiment.nearer(apparent, plain, result["null"]) == 1,
-            rule="resolved at a smaller separation than by the conventional antenna. Resolved: " + rule(result["null"]),
-            name=name,
-            own=_from(least[0]),
-            conventional=_from(least[1]),
-            largest=largest,
-            separation=SEPARATIONS[0],
-            dip=dips[0],
-            dip_conventional=dips[1],
-        )
+        pairs = {"own": _from(least[0]), "conventional": _from(least[1]), "largest": largest, "dips": dips}
+        holds = experiment.nearer(apparent, plain, result["null"]) == 1
+        out.states("{name}: two points resolved", least, holds, **pairs)
         spans = [row["claimed"] for row in (own, apparent, plain)]
-        out.states("{name}: spatial frequencies across", spans, spans[0] > 1.02 * spans[2], name=name)
+        out.states("{name}: spatial frequencies across", spans, spans[0] > 1.02 * spans[2])
         out.parts += page.section(result, level=3)
         out.keep(**{name: {k: v for k, v in result.items() if k != "mapped"}})
         for kind, row in rows.items():

@@ -41,9 +41,10 @@ def patterns(lab: Lab) -> Section:
         row, column = np.unravel_index(int(power.argmax()), power.shape)
         return power, (float(ANGLES[row]), float(ANGLES[column]))
 
+    out.say()
     still, at = look(plain, 0.0)
     out.states("CFA: beam", at, at == (0, 0))
-    figures = [_sky(still, "One carrier (figure 3.3).")]
+    out.draw(_sky(still, "One carrier (figure 3.3)."))
     for plane, figure, elevated in (("azimuth", "3.5", False), ("elevation", "3.4", True)):
         angle = np.radians(ANGLES)
         u = directions(0 * angle, angle) if elevated else directions(angle, 0.0)
@@ -52,35 +53,25 @@ def patterns(lab: Lab) -> Section:
             for r in (1e3, 1e5)
         )
         off = float(np.abs(near - far).max())
-        out.states("CFA: change with range, 1 to 100 km, along {plane}", off, off < 1e-2, plane=plane, figure=figure)
-        figures.append(html.plot(
-            [("1 km", ANGLES, decibels(near, -60)), ("100 km", ANGLES, decibels(far, -60))], f"{plane}, deg", "dB",
-            f"One carrier, cut along {plane} at two ranges (figure {figure}).",
-        ))  # fmt: skip
+        out.words = {"plane": plane, "figure": figure}
+        out.states("CFA: change with range, 1 to 100 km, along {plane}", off, off < 1e-2)
+        curves = [("1 km", ANGLES, decibels(near, -60)), ("100 km", ANGLES, decibels(far, -60))]
+        out.plot("One carrier, cut along a plane", curves)
     start, _ = look(diverse, 0.0)
     off = float(np.abs(start - still).max())
     out.states("FDA at t' = 0", off, off < 1e-2)
-    figures.append(_sky(start, "Diverse carriers at t' = 0 (figure 3.6)."))
+    out.draw(_sky(start, "Diverse carriers at t' = 0 (figure 3.6)."))
     for sign in (1, -1):
         power, at = look(diverse, sign * TIME)
         holds = at == (30, -60)
-        out.states(
-            "FDA: beam (elevation, azimuth) at t' = {us:+d} us",
-            at,
-            holds,
-            why="the beam of figure 3.7"
-            if holds
-            else "equations 3.53 and 3.54 give this too: the figure shows -250 us",
-            us=sign * 250,
-        )
-        figures.append(_sky(power, f"Diverse carriers at t' = {sign * 250:+d} us (figure 3.7)."))
-    _over_range(out, figures, diverse, lab)
-    out.say()
-    out.draw(*figures)
+        why = {"why": "the beam of figure 3.7"} if holds else {}
+        out.states("FDA: beam (elevation, azimuth) at t' = {us:+d} us", at, holds, us=sign * 250, **why)
+        out.draw(_sky(power, f"Diverse carriers at t' = {sign * 250:+d} us (figure 3.7)."))
+    _over_range(out, diverse, lab)
     return out
 
 
-def _over_range(out: Section, figures: list[html.Block], array: AntennaArray, lab: Lab) -> None:
+def _over_range(out: Section, array: AntennaArray, lab: Lab) -> None:
     """Figures 3.8 and 3.9: principal planes at t = 0, over range."""
     ranges, angle = np.arange(2e3, 302e3, 2e3), np.radians(ANGLES)
     for name, figure, sign, u in (
@@ -89,18 +80,10 @@ def _over_range(out: Section, figures: list[html.Block], array: AntennaArray, la
     ):
         power = np.abs(beam(array, F0, times=0.0, positions=ranges[:, None, None] * u, device=lab.device)) / 81
         peak = float(ANGLES[int(power[24].argmax())])  # 50 km out
-        out.states(
-            "FDA: {name} of the beam at t = 0, 50 km out",
-            peak,
-            np.sign(peak) == sign,
-            name=name,
-            figure=figure,
-            direction="positive" if sign > 0 else "negative",
-        )
-        figures.append(html.picture(
-            decibels(power.T, -60), (0.0, 302.0), (-85.5, 85.5), "range, km", f"{name}, deg",
-            f"Diverse carriers at t = 0 over range (figure {figure}).", floor_db=-40,
-        ))  # fmt: skip
+        out.words = {"name": name, "figure": figure, "direction": "positive" if sign > 0 else "negative"}
+        out.states("FDA: {name} of the beam at t = 0, 50 km out", peak, np.sign(peak) == sign)
+        ends = (0.0, 302.0), (-85.5, 85.5)
+        out.picture("Diverse carriers over range", decibels(power.T, -60), *ends, floor_db=-40)
 
 
 def errors(lab: Lab) -> Section:
@@ -130,17 +113,13 @@ def errors(lab: Lab) -> Section:
         else:
             out.number("largest error of the power pattern, 150 MHz", 10 * np.log10(worst), text=text)
             at20 = float(apart[np.isclose(degrees, 20)][0])
-            out.states(
-                "error inside +-45 deg, 150 MHz", at20, at20 < 0.1, at_45=float(apart[np.isclose(degrees, 45)][0])
-            )
+            at45 = float(apart[np.isclose(degrees, 45)][0])
+            out.states("error inside +-45 deg, 150 MHz", at20, at20 < 0.1, at_45=at45)
         figures = ("3.10", "3.11") if name == "A" else ("3.12", "3.13")
-        out.draw(*(
-            html.picture(
-                np.maximum(10 * np.log10(np.maximum(p, 1e-9)), -60).T, (0.0, 1e9 / step), (-90.0, 90.0), "t', ns",
-                "azimuth, deg", f"{what} power pattern, {step / 1e6:g} MHz (figure {figure}).", floor_db=-20,
-            )
-            for what, p, figure in zip(("Exact", "Closed-form"), (exact, approximate), figures, strict=True)
-        ))  # fmt: skip
+        for what, power, figure in zip(("Exact", "Closed-form"), (exact, approximate), figures, strict=True):
+            out.words = {"what": what, "mhz": step / 1e6, "figure": figure}
+            db = np.maximum(10 * np.log10(np.maximum(power, 1e-9)), -60).T
+            out.picture("Power pattern", db, (0.0, 1e9 / step), (-90.0, 90.0), floor_db=-20)
         out.keep(**{f"error, {step / 1e6:g} MHz": {"deg": degrees[::4], "error": apart[::4]}})
     bound = closed.quadratic_phase(shape=SHAPE, spacing=(0.015, 0.015), frequency_step=(30e6, 0), cosines=(1, 0))
     out.number("quadratic phase of scenario A", bound, expected=np.pi / 4)

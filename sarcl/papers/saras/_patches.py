@@ -73,28 +73,14 @@ def section(lab: Lab) -> Section:
             if is_rejected
         ]
         verdict = f"Rayleigh rejected by {' and by '.join(rejected)}" if rejected else "Rayleigh not rejected"
-        out.states(
-            "case {name}, {statistics}: grey levels",
-            [statistics.rayleigh, statistics.contrast],
-            (not rejected) == case.rayleigh,
-            expected="Rayleigh" if case.rayleigh else "not Rayleigh",
-            name=name,
-            statistics=case.words,
-            verdict=verdict,
-            n=len(amplitude),
-            significant=SIGNIFICANT,
-            test=TEST,
-            standard_errors=STANDARD_ERRORS,
-        )
+        out.words = {"name": name, "statistics": case.words, "verdict": verdict, "n": len(amplitude),
+                     "significant": SIGNIFICANT, "test": TEST, "standard_errors": STANDARD_ERRORS}  # fmt: skip
+        value, expected = [statistics.rayleigh, statistics.contrast], "Rayleigh" if case.rayleigh else "not Rayleigh"
+        out.states("case {name}, {statistics}: grey levels", value, (not rejected) == case.rayleigh, expected=expected)
         bins, density = histogram(amplitude / np.sqrt((amplitude**2).mean()), 3.0, 16)
         out.draw(picture(clean, grid, f"Figure 12 {name}: {case.words}. Hamming window.", -25.0))
-        out.plot(
-            "Grey levels of the lower left patch",
-            [(f"case {name}", bins, density), ("Rayleigh", bins, rayleigh(bins))],
-            dots=[f"case {name}"],
-            name=name,
-            n=len(amplitude),
-        )
+        curves = [(f"case {name}", bins, density), ("Rayleigh", bins, rayleigh(bins))]
+        out.plot("Grey levels of the lower left patch", curves, dots=[f"case {name}"])
     out.say()
     _brightness(out, mean, reflected)
     out.keep(mean=mean, reflected=reflected)
@@ -126,13 +112,8 @@ def _brightness(out: Section, mean: dict[str, np.ndarray], reflected: np.ndarray
     """Whether patches are as bright as their reflectivity says, and how bright a mirror is."""
     bright = reflected > 1e-3
     ratio = 10 * np.log10(mean["b"][bright] / reflected[bright])
-    out.states(
-        "case b: brightness of the patches and Fresnel's |R|^2",
-        float(np.std(ratio)),
-        np.std(ratio) < 1.0,
-        rms=np.std(ratio),
-        span=np.ptp(10 * np.log10(reflected[bright])),
-    )
+    rms, span = float(np.std(ratio)), np.ptp(10 * np.log10(reflected[bright]))
+    out.states("case b: brightness of the patches and Fresnel's |R|^2", rms, rms < 1.0, rms=rms, span=span)
     level = float(10 * np.log10(np.median(mean["d"][bright] / mean["b"][bright])))
     out.states("case d: power of the patches without statistics", level, level < -40, below=-level)
 

@@ -55,23 +55,12 @@ def figure_9(lab: Lab) -> Section:
     out.states("raw signal by Fourier transforms and by the sum over facets and pulses", apart, apart < 2e-2)
     footprint = WIDTH * np.hypot(HEIGHT, DISTANCE)
     order = SPEED_OF_LIGHT / CHIRP.center * np.hypot(HEIGHT, DISTANCE) / (2 * np.pi * footprint**2)
-    out.states(
-        "error of the paper's transfer function, by stationary phase",
-        of_paper,
-        order / 5 < of_paper < 5 * order,
-        order=order,
-    )
+    holds = order / 5 < of_paper < 5 * order
+    out.states("error of the paper's transfer function, by stationary phase", of_paper, holds, order=order)
     _show_raw(out, raw, window)
     _show_image(out, lab, raw, track)
-    out.say(
-        height_km=HEIGHT / 1e3,
-        look_deg=np.degrees(LOOK),
-        side=SIDE,
-        cone_width=2 * CONE[0],
-        cone_height=CONE[1],
-        cell=CELL,
-        step=STEP,
-    )
+    look = np.degrees(LOOK)
+    out.say(height_km=HEIGHT / 1e3, look_deg=look, side=SIDE, cone=CONE, cone_width=2 * CONE[0], cell=CELL, step=STEP)
     return out
 
 
@@ -99,15 +88,9 @@ def _show_raw(out: Section, raw: PhaseHistory, window: float) -> None:
     rows = np.abs(azimuth) < SIDE / 2 + WIDTH * np.hypot(HEIGHT, DISTANCE) / 2
     real = signal.real[np.ix_(rows, columns)] / np.abs(signal).max()
     top = float(np.percentile(np.abs(real), 99))
-    out.picture(
-        "Real part of the raw signal",
-        np.clip(real, -top, top),
-        _edges(ranges[columns]),
-        _edges(azimuth[rows]),
-        floor_db=-2 * top,
-        unit="of the largest modulus",
-        equal=True,
-    )
+    ends, unit = (_edges(ranges[columns]), _edges(azimuth[rows])), "of the largest modulus"
+    values = np.clip(real, -top, top)
+    out.picture("Real part of the raw signal", values, *ends, floor_db=-2 * top, unit=unit, equal=True)
 
 
 def _show_image(out: Section, lab: Lab, raw: PhaseHistory, track: Trajectory) -> None:
@@ -124,22 +107,12 @@ def _show_image(out: Section, lab: Lab, raw: PhaseHistory, track: Trajectory) ->
     ranges, azimuth = image.grid.ranges - middle, (image.grid.times - closest.mean()) * track.velocities[0, 1]
     profile = power[np.abs(azimuth) < 2].mean(axis=0)
     front = -CONE[0] * float(np.sin(LOOK))  # the whole line from foot to tip lies at one range
-    cell = SPEED_OF_LIGHT / 2 / CHIRP.bandwidth
-    out.number(
-        "brightest slant range of the cone in the range-Doppler image",
-        float(ranges[profile.argmax()]),
-        expected=front,
-        within=1.5 * cell,
-    )
-    out.picture(
-        "Range-Doppler image of this raw signal",
-        10 * np.log10(np.maximum(power / np.median(power), 1e-9)),
-        _edges(ranges),
-        _edges(azimuth),
-        floor_db=-30.0,
-        percentile=99.5,
-        equal=True,
-    )
+    cell, brightest = SPEED_OF_LIGHT / 2 / CHIRP.bandwidth, float(ranges[profile.argmax()])
+    item = "brightest slant range of the cone in the range-Doppler image"
+    out.number(item, brightest, expected=front, within=1.5 * cell)
+    db = 10 * np.log10(np.maximum(power / np.median(power), 1e-9))
+    look: dict[str, Any] = {"floor_db": -30.0, "percentile": 99.5, "equal": True}
+    out.picture("Range-Doppler image of this raw signal", db, _edges(ranges), _edges(azimuth), **look)
 
 
 def _edges(middles: np.ndarray) -> tuple[float, float]:
@@ -156,33 +129,20 @@ def times(lab: Lab) -> Section:
     for cells in (1, 2, 3, 4):
         side = n * STEP / 2
         scene = ground((-side, side), (DISTANCE - side, DISTANCE + side), (cells * n, cells * n), material=ROUGH)
-        options: dict[str, Any] = {
-            "antenna": ANTENNA,
-            "tolerance": RAW_TOLERANCE,
-            "max_edge": None,
-            "device": lab.device,
-        }
+        options: dict[str, Any] = {"antenna": ANTENNA, "max_edge": None, "device": lab.device}
         results = []
         for generator in (spectral_echo, echo):
             start = time.perf_counter()
             with warnings.catch_warnings():  # one facet per pixel is too few for speckle, and the paper's choice
                 warnings.simplefilter("ignore", SarclWarning)
-                raw = generator(scene, CHIRP, _track(2 * side), check=True, **options)
+                raw = generator(scene, CHIRP, _track(2 * side), tolerance=RAW_TOLERANCE, check=True, **options)
             report = raw.report
             assert report is not None and report.measured_error is not None
             seconds = time.perf_counter() - start - report.seconds.get("check", 0.0)
             results += [seconds, report.measured_error]
         square = cells * cells
-        rows.append(
-            [
-                str(square),
-                str(VAX[square]),
-                f"{results[0]:.1f}",
-                f"{results[1]:.1e}",
-                f"{results[2]:.1f}",
-                f"{results[3]:.1e}",
-            ]
-        )
+        measured = [f"{value:{form}}" for value, form in zip(results, (".1f", ".1e", ".1f", ".1e"), strict=True)]
+        rows.append([str(square), str(VAX[square]), *measured])
         out.keep(**{f"{square} facets per pixel: seconds and errors": results})
         worst = max(worst, results[1], results[3])
     out.table("Seconds on the device of this run", rows)

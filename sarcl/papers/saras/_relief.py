@@ -59,18 +59,12 @@ def _edges(
         places = (np.arange(240) - 120) * FINE.null[1] * scale / 4
         lit = profile[places > ends[1] * scale + 4].mean()
         first, last = crossings(profile, places, lit / 2)
-        within = 0.5 * FINE.null[1] * scale
+        cell = FINE.null[1] * scale
+        out.words = {"plane": plane}
         for name, wanted, found in (("begins", ends[0], first), ("ends", ends[1], last)):
-            out.number(
-                "shadow {name}, {plane} range", found, expected=wanted * scale, within=within, name=name, plane=plane
-            )
-        out.number(
-            "length of the dark run, {plane} range",
-            last - first,
-            expected=(ends[1] - ends[0]) * scale,
-            within=0.7 * FINE.null[1] * scale,
-            plane=plane,
-        )
+            out.number("shadow {name}, {plane} range", found, expected=wanted * scale, within=0.5 * cell, name=name)
+        run = (ends[1] - ends[0]) * scale
+        out.number("length of the dark run, {plane} range", last - first, expected=run, within=0.7 * cell)
         if plane == "ground":
             over = profile[(places > front + 2) & (places < -depth - 2)].mean()
             before = profile[(places > front - 15) & (places < front - 2)].mean()
@@ -94,17 +88,12 @@ def cone(lab: Lab) -> Section:
     y = np.abs(grid.positions[:, 0, 1])
     middle, side = y < 0.5, (y > 5) & (y < 9)
     bright = [float(p[middle].mean(axis=0).max() / p[side].mean(axis=0).max()) for p in mean]
-    for i, name in enumerate(POLARIZATIONS):
-        most = i < 2
-        out.states(
-            "{name} where the cone faces the radar",
-            bright[i],
-            bright[i] > 2 if most else bright[i] < 0.3,
-            expected="maximum return" if most else "no return",
-            rule="above 2" if most else "below 0.3",
-            name=name,
-            number=14 + i,
-        )
+    for name, number, ratio in zip(POLARIZATIONS, (14, 15, 16), bright, strict=True):
+        out.words = {"name": name, "number": number}
+        if name == "HV":
+            out.states("{name} where it faces the radar", ratio, ratio < 0.3)
+        else:
+            out.states("{name} where the cone faces the radar", ratio, ratio > 2)
     x = grid.positions[0, :, 0]
     peak = mean[:2, middle].mean(axis=1).max(axis=1)
     apart = float(10 * np.log10(peak[1] / peak[0]))

@@ -55,25 +55,15 @@ def section(lab: Lab) -> Section:
 def _distributions(out: Section, pixels: np.ndarray) -> None:
     """Figure 6: amplitude, phase and intensity of independent pixels."""
     noise = speckle(pixels)
-    test = {"test": TEST, "significant": SIGNIFICANT}
+    out.words = {"test": TEST, "significant": SIGNIFICANT}
     for item, p in (("amplitudes of the image", noise.rayleigh), ("phases of the image", noise.uniform)):
-        out.states(item, p, p > SIGNIFICANT, measured=tested(p), **test)
+        out.states(item, p, p > SIGNIFICANT, measured=tested(p))
     error = 1 / np.sqrt(pixels.size)  # of the contrast of so many exponential intensities
-    out.number(
-        "standard deviation of the intensity over its mean",
-        noise.contrast,
-        why="" if abs(noise.contrast - 1) <= 4 * error else "more than four standard errors off",
-        within=4 * error,
-    )
+    why = {"why": ""} if abs(noise.contrast - 1) <= 4 * error else {}
+    out.number("standard deviation of the intensity over its mean", noise.contrast, within=4 * error, **why)
     of_intensity = speckle(np.abs(pixels) ** 2 + 0j).rayleigh
-    out.states(
-        "intensities of the image",
-        of_intensity,
-        of_intensity > SIGNIFICANT,
-        measured=tested(of_intensity),
-        test=TEST,
-        significant=SIGNIFICANT,
-    )
+    holds = of_intensity > SIGNIFICANT
+    out.states("intensities of the image", of_intensity, holds, measured=tested(of_intensity))
 
 
 def _correlations(out: Section, lab: Lab, radar: FarRadar, raw: PhaseHistory, n: tuple[int, int]) -> None:
@@ -83,27 +73,15 @@ def _correlations(out: Section, lab: Lab, radar: FarRadar, raw: PhaseHistory, n:
     shape = [int((k - 8) / s) for k, s in zip(n, size, strict=True)]
     pixels = radar.focus(raw, radar.grid(shape, (1 / size[0], 1 / size[1])), device=lab.device)
     table = np.array([[_correlation(pixels, azimuth, along) for azimuth in range(5)] for along in range(5)])
-    within = 0.05
     for name, printed, found in (("azimuth", TABLE[0], table[0]), ("range", [row[0] for row in TABLE], table[:, 0])):
         for lag in range(1, 5):
-            out.number(
-                "autocorrelation, lag {lag} in {name}",
-                float(found[lag]),
-                expected=printed[lag],
-                why="the size of a pixel was chosen by this lag" if lag == 1 else "",
-                within=within,
-                lag=lag,
-                name=name,
-            )
+            why = {} if lag == 1 else {"why": ""}
+            out.words = {"lag": lag, "name": name}
+            out.number("autocorrelation, lag {lag} in {name}", float(found[lag]), expected=printed[lag], **why)
     apart = float(np.abs(table - TABLE).max())
     out.states("autocorrelation at all 25 lags", apart, apart < 0.06)
-    out.say(
-        azimuth_nulls=size[0],
-        range_nulls=size[1],
-        error=1 / np.sqrt(np.prod(shape) * np.prod(size)),
-        n_azimuth=shape[0],
-        n_range=shape[1],
-    )
+    error = 1 / np.sqrt(np.prod(shape) * np.prod(size))
+    out.say(size=size, error=error, shape=shape)
     rows = [[str(i), *(f"{a:.2f} / {b:.2f}" for a, b in zip(TABLE[i], table[i], strict=True))] for i in range(5)]
     head = ["range lag", *(f"azimuth lag {i}" for i in range(5))]
     out.draw(html.table(head, rows, "Table I: printed / measured autocorrelation."))
@@ -116,10 +94,8 @@ def _correlations(out: Section, lab: Lab, radar: FarRadar, raw: PhaseHistory, n:
     response = np.abs(radar.focus(point, ImageGrid.points(places), device=lab.device))
     off = float(np.abs(curve - response).max())
     out.states("autocorrelation along range and the response of a point", off, off < 0.05)
-    out.plot(
-        "Range section of the image's autocorrelation",
-        [("autocorrelation of the image", lags / FINE, curve), ("response of a point", lags / FINE, response)],
-    )
+    curves = [("autocorrelation of the image", lags / FINE, curve), ("response of a point", lags / FINE, response)]
+    out.plot("Range section of the image's autocorrelation", curves)
     out.keep(table=table, pixel_in_nulls=size, curve=curve, response=response)
 
 

@@ -21,8 +21,4 @@ from . import _errata, _orbit, _patches, _speckle
 
 __all__ = ["PAPER"]
 
-PAPER = Paper.of(
-    "wan",
-    lab=Lab,
-    sections=(_speckle.section, _patches.section, _orbit.section, _errata.section),
-)
+PAPER = Paper.of("wan", lab=Lab, sections=(_speckle.section, _patches.section, _orbit.section, _errata.section))

@@ -32,42 +32,21 @@ class Comparison:
 
 def section(lab: Lab) -> Section:
     """Figure 8."""
-    out = Section.of("zou", "forming")
+    out = Section.of("zou", "forming", n_azimuths=N_AZIMUTHS, fine=FINE, tolerance=TOLERANCE)
     n, times = len(lab.radar.track), []
     for name in (BRICK, CONE):
         errors = compared(lab, name)
         report, plan = report_of(lab.full_wave(name))
         anchors, one, own = len(plan["anchors"]), *errors.totals
-        out.states(
-            "{name}: one anchor against one run per azimuth",
-            one,
-            one < FINE,
-            source="figure 8" if name == BRICK else "section 4",
-            name=name,
-            worst=errors.one.max(),
-            n_azimuths=N_AZIMUTHS,
-            fine=FINE,
-        )
-        out.states(
-            "{name}: {anchors} anchors against one run per azimuth",
-            own,
-            own < TOLERANCE,
-            name=name,
-            anchors=anchors,
-            worst=errors.own.max(),
-            tolerance=TOLERANCE,
-            n_azimuths=N_AZIMUTHS,
-            predicted=report.predicted_error,
-        )
+        out.words |= {"name": name, "anchors": anchors, "predicted": report.predicted_error}
+        source, worst = "figure 8" if name == BRICK else "section 4", errors.one.max()
+        out.states("{name}: one anchor against one run per azimuth", one, one < FINE, source=source, worst=worst)
+        item = "{name}: {anchors} anchors against one run per azimuth"
+        out.states(item, own, own < TOLERANCE, worst=errors.own.max())
         degrees = np.degrees(errors.angle)
-        out.plot(
-            "Error of waveform forming at each azimuth",
-            [
-                ("one anchor, as in the paper", degrees, _db(errors.one)),
-                (f"{anchors} anchors", degrees, _db(errors.own)),
-            ],
-            name=name,
-        )
+        curves = [("one anchor, as in the paper", errors.one), (f"{anchors} anchors", errors.own)]
+        curves_db = [(label, degrees, _db(error)) for label, error in curves]
+        out.plot("Error of waveform forming at each azimuth", curves_db)
         own_seconds = sum(report.seconds.values())
         times.append([
             name, f"{errors.seconds[0] * n:.0f}", f"{errors.seconds[1]:.1f}", f"{own_seconds:.0f}",

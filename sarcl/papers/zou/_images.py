@@ -40,33 +40,19 @@ def section(name: str, lab: Lab) -> Section:
     raws = {polarization: both.select(polarization=polarization) for polarization in BOTH}
     for polarization, raw in raws.items():
         field = received(raw, FIELD_RATE, 0.0)
-        out.picture(
-            "Envelope of the field at the receiver",
-            _db(np.abs(field.samples)),
-            *_ends(field, raw),
-            floor_db=FLOOR,
-            unit=LEVEL,
-            words={"polarization": polarization, "target": target},
-        )
+        out.words |= {"polarization": polarization}
+        levels_db = _db(np.abs(field.samples))
+        out.picture("Envelope of the field at the receiver", levels_db, *_ends(field, raw), floor_db=FLOOR, unit=LEVEL)
     records = {polarization: received(raw) for polarization, raw in raws.items()}
     for part, values in (("I", records["HH"].samples.real), ("Q", records["HH"].samples.imag)):
-        out.picture(
-            "Samples",
-            values,
-            *_ends(records["HH"], raws["HH"]),
-            floor_db=-2 * float(values.max()),
-            unit="m",
-            words={"part": part, "target": target},
-        )
+        out.words |= {"part": part}
+        out.picture("Samples", values, *_ends(records["HH"], raws["HH"]), floor_db=-2 * float(values.max()), unit="m")
     view = _View(lab, name)
     chains = {polarization: compress(recorded(records[polarization], raw)) for polarization, raw in raws.items()}
     sampled = {polarization: view.range_doppler(chain) for polarization, chain in chains.items()}
     for polarization, image in sampled.items():
-        out.draw(
-            view.picture(
-                _amplitudes(image), f"{polarization}, range-Doppler image of the samples (figure 7 {target.letter})."
-            )
-        )
+        caption = f"{polarization}, range-Doppler image of the samples (figure 7 {target.letter})."
+        out.draw(view.picture(_amplitudes(image), caption))
     images = {polarization: np.abs(view.backprojected(raw)) for polarization, raw in raws.items()}
     for polarization, pixels in images.items():
         out.draw(view.picture(pixels, f"{polarization}, backprojection of the echoes."))
@@ -102,17 +88,9 @@ def _say(out: Section, found: Levels, both: PhaseHistory) -> None:
     cross = 20 * np.log10(max(found.peak[1] / found.peak[0], LEAST))
     report, grid = report_of(both)
     model = report.model_error
-    out.say(
-        peak_db=20 * np.log10(found.peak[0]),
-        optics_db=20 * np.log10(found.optics),
-        apart=found.apart,
-        cross=cross,
-        cells=grid["grid"],
-        cell_mm=1e3 * grid["cell_m"],
-        per_wavelength=grid["cells"],
-        predicted=report.predicted_error,
-        model_error=model or 0,
-    )
+    peak, optics = 20 * np.log10(found.peak[0]), 20 * np.log10(found.optics)
+    out.words |= {"peak_db": peak, "optics_db": optics, "found": found, "cross": cross, "model_error": model or 0}
+    out.say(grid=grid, cell_mm=1e3 * grid["cell_m"], predicted=report.predicted_error)
     out.keep(
         peak_hh_dbsm=20 * np.log10(found.peak[0]), cross_over_co_db=cross, rms_hh=found.rms[0], rms_vh=found.rms[1],
         peak_hh_optics_dbsm=20 * np.log10(found.optics), optics_differs=found.apart, model_error=model,

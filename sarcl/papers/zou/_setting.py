@@ -42,16 +42,9 @@ def section(lab: Lab) -> Section:
     out.states("phase error of plane waves at the ends of the tank, equation 4", phase, phase < 0.1)
     out.keep(range_m=radar.range_, pulses=len(radar.track), half_beam_deg=np.degrees(HALF_BEAM), plane_wave_rad=plane)
     size = "" if radar.reduction == 1 else f" This run has targets, range and track of 1/{radar.reduction} of these."
-    out.say(
-        range=RANGE,
-        pulses=PULSES,
-        track=RANGE * 2 * np.tan(HALF_BEAM),
-        half_beam_deg=np.degrees(HALF_BEAM),
-        doppler=DOPPLER,
-        upper=upper,
-        prf=PRF,
-        size=size,
-    )
+    track, half_beam = RANGE * 2 * np.tan(HALF_BEAM), np.degrees(HALF_BEAM)
+    out.words = {"range": RANGE, "pulses": PULSES, "track": track, "doppler": DOPPLER, "prf": PRF}
+    out.say(half_beam_deg=half_beam, upper=upper, size=size)
     _table(out, lab)
     return out
 
@@ -65,16 +58,11 @@ def _point(out: Section, lab: Lab) -> None:
     image = backproject(raw, lab.radar.grid((POINT, POINT), SPACING), tolerance=1e-3, check=False, device=lab.device)
     response = measure(image, near=(0.0, 0.0, 0.0))
     assert isinstance(response, PointResponse)
-    for name, width, printed in zip(
-        ("range", "azimuth"), response.irw, (RANGE_RESOLUTION, AZIMUTH_RESOLUTION), strict=True
-    ):
-        out.number(
-            "{name} resolution of a point: distance of peak and null",
-            width / HALF_POWER,
-            expected=printed,
-            name=name,
-            width=width,
-        )
+    printed = RANGE_RESOLUTION, AZIMUTH_RESOLUTION
+    for name, width, expected in zip(("range", "azimuth"), response.irw, printed, strict=True):
+        out.words = {"name": name, "width": width}
+        item = "{name} resolution of a point: distance of peak and null"
+        out.number(item, width / HALF_POWER, expected=expected)
     off = float(np.linalg.norm(response.position))
     out.states("place of a point at the origin", off, off < 0.01, off_mm=1000 * off)
 

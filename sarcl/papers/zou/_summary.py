@@ -28,27 +28,17 @@ def section(lab: Lab) -> Section:
     out.table("Brightest pixels", rows)
     others = np.array([v for name, v in cross.items() if name != "sphere"])
     middle = float(np.median(others))
-    out.states(
-        "VH over HH, brightest pixels of the targets but the sphere",
-        middle,
-        abs(middle - CROSS) < NEAR,
-        least=others.min(),
-        most=others.max(),
-        near=NEAR,
-        cross=CROSS,
-    )
+    out.words = {"least": others.min(), "most": others.max(), "near": NEAR, "cross": CROSS}
+    item = "VH over HH, brightest pixels of the targets but the sphere"
+    out.states(item, middle, abs(middle - CROSS) < NEAR)
     edged = [target.name for target in imaged if target.name != "sphere"]
     differ = np.array([lab.levels[name].apart for name in edged])
     reports = [report_of(lab.full_wave(name))[0] for name in edged]
     uncertain = np.array([(report.predicted_error or 0.0) + (report.model_error or 0.0) for report in reports])
-    out.states(
-        "physical optics against full wave, targets with edges",
-        differ,
-        (differ > uncertain).all(),
-        measured=", ".join(
-            f"{name} {d:.0%} (full wave {u:.0%})" for name, d, u in zip(edged, differ, uncertain, strict=True)
-        ),
-    )
+    errors = zip(edged, differ, uncertain, strict=True)
+    measured = ", ".join(f"{name} {d:.0%} (full wave {u:.0%})" for name, d, u in errors)
+    item = "physical optics against full wave, targets with edges"
+    out.states(item, differ, (differ > uncertain).all(), measured=measured)
     out.keep(cross_over_co_db=cross, optics_differs={name: level.apart for name, level in lab.levels.items()})
     return out
 
