@@ -51,7 +51,7 @@ class Builder:
                 )
             self._check_local(kind, "trajectory")
             return self._aimed(self.one("trajectory"), "pointing")
-        orbit, table = self.orbit(), dict(self.scenario.trajectory["orbit"])  # type: ignore[index]
+        orbit, table = self.orbit(), dict(self.section("trajectory")["orbit"])
         place = self.place()
         if place is not None and not {"start", "center"} & set(table):
             with self.scenario.where.blame(("place",), {}):

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from ..scene.scene import Scene
     from ..verbs import BackprojectKeywords, EchoKeywords
 
-Table = Mapping[str, Any]  # table of a scenario: keys with plain values or further tables
+Table = Mapping[str, object]  # table of a scenario: keys with plain values or further tables
 
 
 @dataclass(frozen=True, eq=False)
