@@ -142,36 +142,21 @@ def _focus_method(p: argparse.ArgumentParser) -> None:
     """Options of the method."""
     how = p.add_argument_group("focusing")
     default, of_fast = (f"{DEFAULTS[verb]['tolerance']:g}" for verb in ("backproject", "polar_format"))
-    _add(
-        how, "--tolerance", f"relative error allowed (default {default}; polar_format, range_doppler: {of_fast})", float
-    )
-    _add(
-        how,
-        "--method",
+    text = f"relative error allowed (default {default}; polar_format, range_doppler: {of_fast})"
+    _add(how, "--tolerance", text, float)
+    text = (
         "backprojection (default auto: the cheaper of direct and factorized); polar_format: plane wavefronts; "
-        "range_doppler: straight tracks and orbits, by zero-Doppler time and slant range",
-        choices=[*CHOICES["backproject"]["method"], "polar_format", "range_doppler"],
-        default=DEFAULTS["backproject"]["method"],
+        "range_doppler: straight tracks and orbits, by zero-Doppler time and slant range"
     )
+    methods = [*CHOICES["backproject"]["method"], "polar_format", "range_doppler"]
+    _add(how, "--method", text, choices=methods, default=DEFAULTS["backproject"]["method"])
     _flag(how, "--dry-run", "print method, time, memory and error, and focus nothing")
-    _add(
-        how,
-        "--window",
-        "hamming, taylor:SIDELOBE_DB:NBAR such as taylor:35:5, hann, kaiser:8.6 ...; or RANGE,CROSS-RANGE",
-        window,
-    )
-    _add(
-        how,
-        "--beam DEG",
-        "full angle of the transmit beam, pointed at the grid's centre; range_doppler: of the azimuth beam",
-        degrees,
-    )
-    _add(
-        how,
-        "--mapping",
-        "map the echoes of a frequency-diverse array first (docs/guide/fda.md)",
-        choices=CHOICES["backproject"]["mapping"],
-    )
+    text = "hamming, taylor:SIDELOBE_DB:NBAR such as taylor:35:5, hann, kaiser:8.6 ...; or RANGE,CROSS-RANGE"
+    _add(how, "--window", text, window)
+    text = "full angle of the transmit beam, pointed at the grid's centre; range_doppler: of the azimuth beam"
+    _add(how, "--beam DEG", text, degrees)
+    text = "map the echoes of a frequency-diverse array first (docs/guide/fda.md)"
+    _add(how, "--mapping", text, choices=CHOICES["backproject"]["mapping"])
     _flag(how, "--wrap", "repeat ranges outside the unambiguous swath")
     _add(how, "--max-bytes SIZE", "memory for blocks on the device, e.g. 2G", size)
 
@@ -196,12 +181,8 @@ def _focus_pieces(p: argparse.ArgumentParser) -> None:
         "large images", "finished tiles of an IMAGE.h5 wait in IMAGE.h5.parts; --device all uses every device"
     )
     _add(large, "--tile I/N", "make piece I of N alone; the last to finish puts the image together", piece)
-    _add(
-        large,
-        "--resume",
-        "keep finished tiles whatever ends the run (default: when it is killed), or --no-resume: start again",
-        action=argparse.BooleanOptionalAction,
-    )
+    text = "keep finished tiles whatever ends the run (default: when it is killed), or --no-resume: start again"
+    _add(large, "--resume", text, action=argparse.BooleanOptionalAction)
 
 
 def _focus_rows(p: argparse.ArgumentParser) -> None:
@@ -218,12 +199,8 @@ def _picture(p: argparse.ArgumentParser) -> None:
     _add(grey, "--floor-db DB", "black, dB below white (default -50)", float, default=-50.0)
     white = grey.add_mutually_exclusive_group()
     _add(white, "--top-db DB", "white, dB of a unit point in focus", float)
-    _add(
-        white,
-        "--percentile P",
-        "white: this percentile of the scene's pixels (default 99.5; 100: the brightest pixel)",
-        float,
-    )
+    text = "white: this percentile of the scene's pixels (default 99.5; 100: the brightest pixel)"
+    _add(white, "--percentile P", text, float)
 
 
 def _bench(p: argparse.ArgumentParser) -> None:
