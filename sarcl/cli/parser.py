@@ -12,6 +12,7 @@ import re
 import shlex
 import signal
 import sys
+from collections.abc import Callable
 from typing import Any, NoReturn
 
 from ..io import formats
@@ -42,7 +43,7 @@ class _Parser(argparse.ArgumentParser):
         self.exit(BAD_INPUT, f"sarcl: error: {message} (see {self.prog} --help)\n")
 
 
-def _add(group: Any, words: str, text: str, kind: Any = None, **options: Any) -> None:
+def _add(group: Any, words: str, text: str, kind: Callable[[str], object] | None = None, **options: Any) -> None:
     """Add an option: its names and what follows them, as "-o --output PATH", its help, and what a value becomes."""
     names = [word for word in words.split() if word.startswith("-")] or words.split()[:1]
     values = tuple(words.split()[len(names) :])
@@ -227,7 +228,7 @@ def _bench(p: argparse.ArgumentParser) -> None:
 
 
 class _Version(argparse.Action):
-    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> NoReturn:
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> NoReturn:
         from ..base.version import __version__
 
         print(f"sarcl {__version__}")
@@ -259,7 +260,7 @@ def size(text: str) -> float:
     return value
 
 
-def doppler(text: str) -> Any:
+def doppler(text: str) -> str | float:
     """ "geometry", "data", or Hz (Hz/s)."""
     return text if text in ("geometry", "data") else float(text)
 
@@ -280,7 +281,7 @@ def piece(text: str) -> tuple[int, int]:
 
 def main(argv: list[str] | None = None) -> int:
     """Run a command; returns the exit status."""
-    outputs: Any = {}
+    outputs: dict[str, tuple[int, int] | None] = {}
     debug = "--debug" in (sys.argv[1:] if argv is None else argv)
     try:
         args = parser().parse_args(argv)
@@ -308,7 +309,7 @@ def main(argv: list[str] | None = None) -> int:
         return status
 
 
-def _kept(outputs: Any) -> str:
+def _kept(outputs: dict[str, tuple[int, int] | None]) -> str:
     if not outputs:
         return "nothing was written"
     from ._job import complete
