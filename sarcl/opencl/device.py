@@ -16,9 +16,9 @@ from ..base.text import first_line, size_text
 from ..base.threads import threads
 from ._host_arrays import HostArrays
 from ._launches import Launches, fixed_axes
-from ._programs import build, kernels_of, names_in, quiet, source
 from .device_list import DeviceInfo
 from .failures import buffer_bytes, explained
+from .programs import build, kernels_of, names_in, quiet, source
 
 if TYPE_CHECKING:
     from pyopencl import Buffer as Buffer  # what upload, zeros and empty return, for annotations

@@ -12,8 +12,8 @@ import numpy as np
 
 from ..base.threads import threads
 from ._launches import LASTS, lasted
-from ._programs import quiet
 from .device import Device
+from .programs import quiet
 
 AT_ONCE = 2**22  # most samples of a batch: they fill a GPU, and larger ones gain nothing
 # Multiplications with additions, at the speed of a device's trial, in whose time a launch takes a sample on: an FFT

@@ -8,7 +8,7 @@ import re
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._programs import source
+from .programs import source
 
 TYPES = {"int": np.int32, "uint": np.uint32, "ulong": np.uint64, "float": np.float32}
 

@@ -7,11 +7,11 @@ import pytest
 from helpers.current_cases import antennas, difference, random_currents, twin, unit
 from helpers.devices import as_gpu
 
-from sarcl.fullwave import _current_sums, _dispersion, _formed_echoes
-from sarcl.fullwave._currents import Currents
-from sarcl.fullwave._far_field import amplitude
-from sarcl.fullwave._formed_echoes import formed_echoes, paths_of
-from sarcl.fullwave._incident import PlaneWave
+from sarcl.fullwave import _current_sums, dispersion
+from sarcl.fullwave.currents import Currents
+from sarcl.fullwave.far_field import amplitude
+from sarcl.fullwave.formed_echoes import formed_echoes, paths_of
+from sarcl.fullwave.incident import PlaneWave
 from sarcl.opencl.device import Device
 
 # float32: paths of 10 m to 1e-6 m, phases of some 100 cycles to 3e-5 rad, sums of 2048 terms
@@ -93,7 +93,7 @@ def test_currents_that_follow_the_incident_wave_give_the_echo_of_the_run_of_each
         for row, (at, magnetic) in enumerate(((first.edges, False), (first.faces, True))):
             path = (first.lattice.positions(at, magnetic) - first.centre) @ travel
             parts.append((weight[row] * np.exp(-1j * np.outer(first.k, path))).astype(np.complex64))
-        omega = _dispersion.grid_omega(first.lattice, first.k, travel)
+        omega = dispersion.grid_omega(first.lattice, first.k, travel)
         runs.append(Currents(
             first.lattice, wave, first.centre, first.k, omega, first.edges, parts[0], first.faces, parts[1], 0, 0.0
         ))  # fmt: skip
@@ -120,7 +120,7 @@ def computed_pulses(monkeypatch):
         seen.append(len(paths.tx))
         return sums(device, currents, paths, max_bytes=max_bytes)
 
-    monkeypatch.setattr(_formed_echoes, "current_sums", counted)
+    monkeypatch.setattr("sarcl.fullwave.formed_echoes.current_sums", counted)
     return seen
 
 

@@ -21,10 +21,10 @@ import numpy as np
 
 from sarcl import ToleranceMissed, ToleranceUnreachable
 from sarcl.opencl import choose_device, fft
-from sarcl.opencl._programs import names_in, source
 from sarcl.opencl.device import Device
 from sarcl.opencl.device_list import DeviceInfo
 from sarcl.opencl.launch_numbers import _layout
+from sarcl.opencl.programs import names_in, source
 from sarcl.visibility import lit_parts
 
 KERNEL = re.compile(r"__kernel\s+(?:__attribute__\(\(.*?\)\)\s+)?void\s+(\w+)\s*\(")

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from sarcl.fullwave import _absorber, runs
-from sarcl.fullwave._incident import entrances
-from sarcl.fullwave.bodies._cut_cells import Intervals
+from sarcl.fullwave.bodies.cut_cells import Intervals
+from sarcl.fullwave.incident import entrances
 from sarcl.fullwave.lattice import COURANT, lattice_around
 from sarcl.fullwave.target import Target
 from sarcl.reference import fdtd

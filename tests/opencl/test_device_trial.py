@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import sarcl
-from sarcl.opencl import _linker, _programs, _trial, _trial_record, choose_device, device_list
+from sarcl.opencl import _linker, _trial, _trial_record, choose_device, device_list, programs
 from sarcl.opencl._trial import RESULTS, Outcome
 from sarcl.opencl.choose_device import open_device, open_devices
 
@@ -47,7 +47,7 @@ def test_a_device_that_computes_right_passes(device):
 def test_a_device_that_makes_a_mistake_is_refused_with_what_was_wrong(mistake, monkeypatch):
     device = open_device()
     pattern, wrong, said = MISTAKES[mistake]
-    text, n = re.subn(pattern, lambda match: wrong, _programs.source("trial.cl"))
+    text, n = re.subn(pattern, lambda match: wrong, programs.source("trial.cl"))
     assert n, "the mistake is no longer found in the source"
     monkeypatch.setattr(_trial, "source", lambda file: text)
     found = outcome(device, fp64=False)

@@ -8,8 +8,8 @@ import pytest
 from helpers.kernel_probe import placed
 
 from sarcl.opencl import launch_numbers as module
-from sarcl.opencl._programs import source
 from sarcl.opencl.launch_numbers import launch_numbers
+from sarcl.opencl.programs import source
 
 PROBE = """
 typedef struct {
