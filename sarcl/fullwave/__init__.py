@@ -4,8 +4,10 @@ docs/theory/full_wave.md has the equations, the arrays and what each part hands 
 
 For other folders:
 
+    absorber      absorbing layers (CPML)
     anchors       echoes along a track from anchors that are chosen, predicted, run and interpolated
     bodies/       targets of closed meshes: conductors that cut cells, dielectrics
+    current_sums  sums of currents over cells for many pulses, on a device
     currents      one run: the equivalent currents of a target at the frequencies that are asked for
     dispersion    plane waves of the grid: wavenumber, frequency, polarisation, energy flux
     echoes/       fullwave_echo(): echoes of a track from few runs of the grid
@@ -20,17 +22,17 @@ For other folders:
 
 For this folder alone:
 
-    _absorber     absorbing layers (CPML)
     _along_track  sums over cells at some pulses of a smooth track, interpolated at the others
     _anchor_model interpolation between anchors by their correlation, and its error
-    _current_sums sums of currents over cells for many pulses, on a device
     _lists        lists of cells on a device
     _mirrors      targets that a mirror leaves unchanged, and the anchors that then share a run
 """
 
 __all__ = [
+    "absorber",
     "anchors",
     "bodies",
+    "current_sums",
     "currents",
     "dispersion",
     "echoes",

@@ -13,8 +13,8 @@ import numpy as np
 
 from ..opencl.device import Device
 from ..opencl.launch_numbers import launch_numbers
-from ._absorber import layers
 from ._lists import SAMPLES, CoupledList, IncidentList, TargetList, heard
+from .absorber import layers
 from .incident import COMPONENTS, SILENT, WaveTable, entrances
 from .lattice import COURANT, LANES, ROWS, Lattice
 from .target import Target

@@ -19,7 +19,7 @@ from ..base import boxes
 from ..opencl.device import Device
 from . import dispersion
 from ._along_track import along_track, farthest_phase
-from ._current_sums import Paths, current_sums
+from .current_sums import Paths, current_sums
 from .currents import Currents
 from .lattice import COURANT
 

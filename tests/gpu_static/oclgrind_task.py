@@ -27,7 +27,7 @@ from helpers.current_cases import twin as current_twin
 from helpers.fdtd_cases import Twin, random_target
 
 import sarcl
-from sarcl.fullwave import _current_sums
+from sarcl.fullwave.current_sums import current_sums
 from sarcl.fullwave.fields import BLOCK, Fields
 from sarcl.fullwave.formed_echoes import paths_of
 from sarcl.fullwave.incident import PlaneWave, wave_table
@@ -168,7 +168,7 @@ def currents() -> Errors:
     given = random_currents(70, 9)
     tx, rx = antennas(given, 5, 0.2), antennas(given, 5, 0.5, seed=2)
     paths = paths_of(given, tx, rx)
-    made = _current_sums.current_sums(open_device(), given, paths, max_bytes=None)
+    made = current_sums(open_device(), given, paths, max_bytes=None)
     return difference(made, current_twin(given, paths, tx, rx)), 5e-5
 
 

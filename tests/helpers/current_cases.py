@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sarcl.fullwave import _current_sums, dispersion
+from sarcl.fullwave import dispersion
 from sarcl.fullwave.currents import Currents
 from sarcl.fullwave.incident import PlaneWave
 from sarcl.fullwave.lattice import Lattice
@@ -42,12 +42,16 @@ def antennas(currents, n, spread, distance=RANGE, seed=1):
 
 
 def twin(currents, paths, tx, rx):
-    out = []
-    for _, offset, values in _current_sums._by_component(currents):
-        out.append(formed_echo.current_sums(
-            offset, values(slice(None)), currents.wave.travel, paths.sent, paths.received, tx - currents.centre,
-            rx - currents.centre,
-        ))  # fmt: skip
+    """Sums over the cells of E x, y, z and H x, y, z in float64 (6, P, F)."""
+    out, size = [], int(np.prod(currents.lattice.shape))
+    for at, values, magnetic in ((currents.edges, currents.electric, 0), (currents.faces, currents.magnetic, 1)):
+        offset = currents.lattice.positions(at, bool(magnetic)) - currents.centre
+        for component in range(3):
+            own = at // size == component
+            out.append(formed_echo.current_sums(
+                offset[own], values[:, own], currents.wave.travel, paths.sent, paths.received, tx - currents.centre,
+                rx - currents.centre,
+            ))  # fmt: skip
     return np.array(out)
 
 

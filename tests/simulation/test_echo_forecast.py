@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from helpers.array_cases import TONE, line, passing
@@ -13,6 +15,7 @@ from sarcl.scattering import scatterers
 from sarcl.simulation import _echo_forecast as echo_forecast
 from sarcl.simulation import _planned_echoes as planned_echoes
 from sarcl.simulation._echo_work import pieces_of
+from sarcl.simulation._single_channel import SingleEchoes
 from sarcl.simulation.spectral import _spectral_plan
 
 CHIRP = sarcl.Waveform.chirp(center=9.6e9, bandwidth=150e6, duration=1e-6)
@@ -134,3 +137,17 @@ def test_a_forecast_of_spectral_echo_is_that_of_its_run(monkeypatch):
         with monkeypatch.context() as patched:
             patched.setattr(_spectral_plan, "plan_parts", lambda *given: pytest.fail("planned again"))
             assert same(told.run(), raw) and same(told.run(), raw)
+
+
+def test_a_forecast_times_other_pulses_only_where_nothing_is_seen(monkeypatch):
+    tried, fill = [], SingleEchoes.fill
+
+    def unseen(method, scene, samples, start, done, total):
+        tried.append(start)
+        added = fill(method, scene, samples, start, done, total)
+        return replace(added, counts=replace(added.counts, outside_window=added.counts.pairs))
+
+    sarcl.plan(sarcl.echo, points(), CHIRP, TRACK)
+    monkeypatch.setattr(SingleEchoes, "fill", unseen)
+    assert sarcl.plan(sarcl.echo, points(), CHIRP, TRACK).plan["contributions"] == 0
+    assert len(set(tried)) == 3

@@ -187,3 +187,12 @@ def test_smoothing_keeps_the_window_and_its_sum(window):
     assert np.abs(made.weights - wanted)[middle].max() < 0.03
     assert made.weights.sum() * step / (2 * half) == pytest.approx(table.mean(), rel=0.02)
     assert made.weight(np.array([-2 * half, 2 * half])) == pytest.approx([0, 0], abs=0)
+
+
+def test_a_window_beside_the_direction_of_flight_counts_no_rows_beyond_it():
+    """The window's smooth end reaches sines above 1, under which no row sees anything: the share of rows was NaN."""
+    made = ApertureWindow.over(0.9, 1.0, windows.table("hamming"), 0.002, 3e-2)
+    assert made.sines[-1] > 1
+    rows = made.weights[made.sines < 1] / (1 - made.sines[made.sines < 1] ** 2) ** 1.5
+    beyond = made.sines[made.sines < 1] < 0.9
+    assert made.outside(0.9, 1.0) == pytest.approx(rows[beyond].sum() / rows.sum(), rel=1e-12)
