@@ -15,7 +15,6 @@ from ._launches import LASTS, lasted
 from .device import Device
 from .programs import quiet
 
-AT_ONCE = 2**22  # most samples of a batch: they fill a GPU, and larger ones gain nothing
 # Multiplications with additions, at the speed of a device's trial, in whose time a launch takes a sample on: an FFT
 # waits for memory, so this is many times what it computes. Launches that take longer make the next batches smaller.
 SAMPLE = 200.0
@@ -78,7 +77,8 @@ def temporary_bytes(length: int, dtype: Any) -> int:
 
 def rows_at_once(device: Device, length: int) -> int:
     """Rows of a batch on a device, whose launches are short (_launches.LASTS) by the speed that was measured."""
-    samples = min(AT_ONCE, LASTS * device.info.rate / SAMPLE, _slow.get(device, AT_ONCE))
+    most = device.limits.transform
+    samples = min(most, LASTS * device.info.rate / SAMPLE, _slow.get(device, most))
     return max(1, int(samples) // length)
 
 

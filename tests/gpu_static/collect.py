@@ -21,7 +21,7 @@ import numpy as np
 
 from sarcl import ToleranceMissed, ToleranceUnreachable
 from sarcl.opencl import choose_device, fft
-from sarcl.opencl.device import Device
+from sarcl.opencl.device import Device, Limits
 from sarcl.opencl.device_list import DeviceInfo
 from sarcl.opencl.launch_numbers import struct_layout
 from sarcl.opencl.programs import names_in, source
@@ -90,7 +90,7 @@ class PaperDevice(Device):
     """
 
     def __init__(self, info: DeviceInfo, found: dict[Variant, Use]) -> None:
-        self.info, self.found, self.task, self.until = info, found, "", ""
+        self.info, self.limits, self.found, self.task, self.until = info, Limits(), found, "", ""
         self._raw = self.context = self.queue = None
         self._kernels: dict[tuple[Any, ...], dict[str, Any]] = {}
         self._lock = threading.RLock()

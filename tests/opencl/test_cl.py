@@ -20,9 +20,9 @@ from sarcl.fullwave.fields import Fields
 from sarcl.fullwave.lattice import Lattice
 from sarcl.fullwave.target import Target
 from sarcl.opencl import _trial_record, choose_device, device_list, fft, programs
-from sarcl.opencl import device as device_module
 from sarcl.opencl._trial import Outcome
 from sarcl.opencl.choose_device import open_device
+from sarcl.opencl.device import Device, Limits
 from sarcl.opencl.device_list import DeviceInfo
 
 
@@ -291,8 +291,8 @@ def test_a_kernel_of_many_launches_is_told_the_types_of_its_numbers_and_gives_th
     grid, fields = Lattice(0.01, (3, 4, 16), np.zeros(3)), []
     start = np.random.default_rng(1).uniform(-1, 1, (2, 3, *grid.shape))
     for many in (10**9, 3):
-        monkeypatch.setattr(device_module, "MANY_LAUNCHES", many)
-        run = Fields(device_module.Device(device.info, device._raw), grid, Target.nothing())
+        one = Device(device.info, device._raw, Limits(launches=many))
+        run = Fields(one, grid, Target.nothing())
         run.start(*start)
         run.advance(8)
         fields.append(run.download())
