@@ -1,6 +1,6 @@
 """Shadows: what one ray a facet sees equals the test of every ray against every facet, and obeys geometry.
 
-Shares of facets, blocks of pulses and outlines of bodies: test_lighting.py. Terrain: test_terrain_shadow.py.
+Shares of facets, blocks of pulses and outlines of bodies: test_illumination.py. Terrain: test_terrain_shadow.py.
 """
 
 from __future__ import annotations
