@@ -97,6 +97,18 @@ def test_rows_in_any_order_get_the_checksums_of_what_was_written(tmp_path):
         rows.file.close()
 
 
+def test_rows_written_in_order_are_not_read_again_for_their_checksums():
+    rows = np.arange(_checksums.BLOCK_BYTES // 8 * 5 // 2, dtype=np.complex64).reshape(-1, 8)
+    sums = _checksums.RunningSums(rows.shape, rows.dtype)
+    each = len(rows) // 7
+    for first in range(0, len(rows), each):
+        sums.wrote(slice(first, min(first + each, len(rows))), rows[first : first + each])
+    assert len(sums.sums) == 3
+    found = sums.of(None)  # there is nothing to read
+    sums.wrote(slice(3, 4), rows[3:4])
+    assert sums.of(rows) == found
+
+
 @pytest.mark.parametrize("name", ["tx", "frequency", "reference_range"])
 def test_a_damaged_field_is_named(tmp_path, name):
     saved(tmp_path / "a.h5")

@@ -9,7 +9,6 @@ import pytest
 from helpers.devices import as_gpu
 
 from sarcl.opencl import fft
-from sarcl.opencl._launches import LASTS
 from sarcl.opencl.device import Device, Limits
 
 
@@ -44,13 +43,13 @@ def test_rows_in_batches_are_those_of_one_batch_to_the_bit(device, planned, inve
 def test_batches_are_smaller_on_slow_devices(device):
     fast, slow, slowest = (Device(replace(device.info, kind="gpu", rate=r), device._raw) for r in (1e12, 1e9, 1e3))
     assert fft.rows_at_once(fast, 1024) == fast.limits.transform // 1024
-    assert fft.rows_at_once(slow, 1024) == int(LASTS * 1e9 / fft.SAMPLE) // 1024 < fft.rows_at_once(fast, 1024)
+    assert fft.rows_at_once(slow, 1024) == int(fft.LASTS * 1e9 / fft.SAMPLE) // 1024 < fft.rows_at_once(fast, 1024)
     assert fft.rows_at_once(slowest, 1024) == 1
 
 
 def test_a_launch_that_lasts_long_makes_the_next_batches_smaller(device, monkeypatch, planned):
     gpu, data = Device(replace(device.info, kind="gpu"), device._raw, Limits(transform=16 * 64)), noise(40, 64)
-    monkeypatch.setattr(fft, "lasted", lambda event, enqueued: LASTS * planned[-1][0] / 5)  # five rows in LASTS
+    monkeypatch.setattr(fft, "lasted", lambda event, enqueued: fft.LASTS * planned[-1][0] / 5)  # five rows in fft.LASTS
     made = fft.rows(gpu, data, engine="reikna")
     assert np.linalg.norm(made - np.fft.fft(data)) <= 1e-6 * np.linalg.norm(made)
     assert planned == [(16, 64), *5 * [(5, 64)]]
