@@ -18,9 +18,9 @@ from ..scene.scene import Scene
 from ..scene.terrain import Heights, above, check_above, clear_of, facets_on
 from ..visibility.illumination import ALL_DARK, Illumination, lit
 from ..visibility.lit_parts import ON_PLANE, FacetPieces, LitParts
-from ._random_surface import Pieces
 from .facet_kinds import coherent
 from .facets import FacetSet
+from .random_surface import Pieces
 from .rough_pieces import RoughFacets, RoughPieces
 
 Progress = Callable[[int, int], object]  # called as progress(pulse, pulses)

@@ -97,6 +97,11 @@ def test_private_files_are_imported_by_their_own_folder_alone():
     assert sum(map(is_private, files())) > 50
 
 
+def test_tests_of_other_rooms_import_no_private_file():
+    wrong = {name: sorted(tests) for name, tests in outside_tests().items() if tests and "._" in name}
+    assert not wrong, f"{wrong}: let the tests use public names, stand with the room, or the file have a public name"
+
+
 def test_files_that_only_their_own_folder_imports_are_private():
     """Neither the reference, whose users are the tests, nor what the front door names (sarcl/__init__.pyi), nor what
     tests of other rooms need.

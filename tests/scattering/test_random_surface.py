@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import sarcl
-from sarcl.scattering._random_surface import cell_edge, pieces_of
+from sarcl.scattering.random_surface import cell_edge, pieces_of
 
 CHIRP = sarcl.Waveform.chirp(center=9.6e9, bandwidth=300e6, duration=1e-6)
 ROUGH = sarcl.Material(eps_r=4.0, conductivity=1e-3, diagram="cos2")

@@ -8,12 +8,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
-from helpers.lit_cases import seen_centroids
 
 import sarcl
+from sarcl.opencl.choose_device import open_device
 from sarcl.reference.shadow import hidden
-from sarcl.scene.triangles import centroids
-from sarcl.visibility._frame import Frame
+from sarcl.scene.triangles import centroids, normals
+from sarcl.visibility._frame import DevicePoints, Frame
+from sarcl.visibility._ray_casting import Occluders
 
 TOLERANCE = {
     "borderline": (0.0, 4.0),  # times the height at which rays start, 1e-6 of the scene: float32 places are as coarse
@@ -24,6 +25,14 @@ DISTANCES = [60.0, 10e3, 800e3, 36e6]
 def direction(azimuth_deg, incidence_deg):
     a, i = np.deg2rad(azimuth_deg), np.deg2rad(incidence_deg)
     return np.array([np.sin(i) * np.cos(a), np.sin(i) * np.sin(a), np.cos(i)])
+
+
+def seen_centroids(device, triangles, viewpoint, *, by_rays=False):
+    """True (k,) where a viewpoint, m (3,), sees the centroid of a facet, m (k, 3, 3); by_rays  through a tree."""
+    opened = open_device(device)
+    frame = Frame.around(triangles.reshape(-1, 3))
+    points = DevicePoints(opened, centroids(triangles), frame, normals(triangles))
+    return points.seen(Occluders(opened, triangles, frame, 0 if by_rays else len(triangles)), [viewpoint])
 
 
 def visible(triangles, viewpoint, *, device):
