@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from helpers.cases import thinned
 
 import sarcl
 from sarcl.scattering.random_surface import cell_edge, pieces_of
@@ -33,8 +34,9 @@ SURFACES = {
 }
 
 
-@pytest.mark.parametrize("name", SURFACES)
-@pytest.mark.parametrize("other", [{"tolerance": 1e-2}, {"max_edge": 0.11}, {"max_bytes": 1e8}], ids=str)
+@pytest.mark.parametrize(
+    "name, other", thinned(SURFACES, [{"tolerance": 1e-2}, {"max_edge": 0.11}, {"max_bytes": 1e8}])
+)
 def test_tolerance_max_edge_and_max_bytes_leave_the_surface_as_it_is(name, other):
     scene = SURFACES[name]
     one = sarcl.echo(scene, CHIRP, track(), tolerance=5e-2, seed=3, **GIVEN)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from helpers.cases import thinned
 
 import sarcl
 from sarcl import pointing
@@ -34,8 +35,7 @@ ANTENNAS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("antenna", ANTENNAS)
-@pytest.mark.parametrize("material", MATERIALS)
+@pytest.mark.parametrize("material, antenna", thinned(MATERIALS, ANTENNAS))
 def test_factors_of_facets_are_their_amplitudes(material, antenna, every_device, monkeypatch):
     monkeypatch.setattr(factors, "AT_ONCE", 100)  # blocks
     line = sarcl.Trajectory.line(start=(0, -60, 6e3), velocity=(0, 100, 0), prf=250, n_pulses=40)
