@@ -40,7 +40,7 @@ bench: ready  ## run time against the error achieved; peers with ARGS='--peer-py
 autofocus-trial: ready  ## autofocus on 200 random correct scenes, 200 with errors, 200 arms; bench/results/trials/autofocus.json
 	@.venv/bin/python bench/autofocus_trial.py --json bench/results/trials/autofocus.json $(ARGS)
 
-results: ready  ## docs/guide/results.md from bench/results/*.json
+results: ready  ## docs/guide/results.md and results_echoes.md from bench/results/*.json
 	@.venv/bin/python bench/report.py
 
 architecture: ready  ## the drawing and the table of docs/developers/architecture.md, from the imports

@@ -90,7 +90,7 @@ def main() -> None:
 def spread(args: argparse.Namespace, document: Row) -> list[Row]:
     """Rows of sarcl and, where there is one, of finufft; runs alternate."""
     import sarcl
-    from sarcl.reference.echo import echo as exact
+    from sarcl.reference.equations import point_echo as exact
 
     random = np.random.default_rng(0)
     positions = random.uniform(-1, 1, (args.points, 3)) * [100, 100, 5]

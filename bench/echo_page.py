@@ -1,4 +1,4 @@
-"""Tables of bench/echo.py's documents, for a terminal and for docs/guide/results.md."""
+"""Tables of bench/echo.py's documents, for a terminal and for docs/guide/results_echoes.md."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Table of bench/full_wave_peers.py's documents, for a terminal and for docs/guide/results.md."""
+"""Table of bench/full_wave_peers.py's documents, for a terminal and for docs/guide/results_echoes.md."""
 
 from __future__ import annotations
 

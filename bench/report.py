@@ -1,4 +1,7 @@
-"""Write docs/guide/results.md, its plots and README.md's table from bench/results/*.json: python bench/report.py"""
+"""Write docs/guide/results.md and results_echoes.md, plots and README.md's table from bench/results/*.json.
+
+python bench/report.py
+"""
 
 from __future__ import annotations
 
@@ -16,13 +19,28 @@ from sarcl.bench import pareto, ratios, tables
 from sarcl.bench.backproject import FORMAT
 
 ROOT = Path(__file__).parents[1]
-INTRODUCTION = """# Results
+WRITTEN_BY = """`make results` writes this page from the JSON files under bench/results; `make bench` measures your
+machine. How the figures are measured: [benchmarks](../developers/benchmarks.md).
+"""
+IMAGES = f"""# Results
 
-`make results` writes this page from the JSON files under bench/results; `make bench` measures your machine. How the
-figures are measured: [benchmarks](../developers/benchmarks.md).
+Run time of images against achieved error, beside other programs; [echoes and full-wave fields](results_echoes.md) have
+a page of their own.
+
+{WRITTEN_BY}
+## How to read this
+
+{tables.EXPLAINED}
 
 """
-# Documents that are not about run times of images
+ECHOES = f"""# Results: echoes
+
+Run time of echoes, channels of arrays, a pass from orbit and full-wave fields; [images](results.md) have a page of
+their own.
+
+{WRITTEN_BY}
+"""
+# Kinds of documents that are not about run times of images
 OTHER = {
     "echo": echo_page.section, "channels": channels_page.section, "spaceborne": spaceborne_page.section,
     "full wave": full_wave_page.section,
@@ -31,8 +49,8 @@ README_HEAD = ["tolerance", "error achieved", "predicted", "seconds", "Gbp/s", "
 
 
 def write(folder: Path, docs: Path, readme: Path | None = None) -> list[Path]:
-    """Write results.md into the folder `docs`, a picture results-NAME.png beside it for each results/NAME.json, and
-    the README's table.
+    """Write results.md and results_echoes.md into the folder `docs`, a picture results-NAME.png beside them for each
+    results/NAME.json of images, and the README's table.
 
     Returns the files written. ValueError where there is no JSON file, or one of another format.
     """
@@ -40,19 +58,20 @@ def write(folder: Path, docs: Path, readme: Path | None = None) -> list[Path]:
     if not documents:
         raise ValueError(f"{folder} holds no .json; make one: sarcl bench backproject --json {folder}/1.json")
     written = []
-    page = f"{INTRODUCTION}## How to read this\n\n{tables.EXPLAINED}\n\n"
+    pages = {"results.md": IMAGES, "results_echoes.md": ECHOES}
     for name, document in documents.items():
         if document.get("kind") in OTHER:
-            page += OTHER[document["kind"]](name, document)
+            pages["results_echoes.md"] += OTHER[document["kind"]](name, document)
             continue
         drawn = any(ratios.ran(case) for case in document["cases"])
         if drawn:
             picture = docs / f"results-{name}.png"
             picture.write_bytes(pareto.picture(document["cases"]))
             written.append(picture)
-        page += section(name, document, drawn)
-    (docs / "results.md").write_text(page.rstrip("\n") + "\n")
-    written.append(docs / "results.md")
+        pages["results.md"] += section(name, document, drawn)
+    for page, text in pages.items():
+        (docs / page).write_text(text.rstrip("\n") + "\n")
+        written.append(docs / page)
     if readme is not None:
         block = next((readme_table(d) for d in documents.values() if "cases" in d), "")
         text = readme.read_text()

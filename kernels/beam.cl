@@ -18,7 +18,7 @@
 //           LANES     entries of a tile of lanes, a multiple of VW
 //           FLUSH     elements added plainly before they join the compensated total
 //           CHUNK     elements that a work-item of `times` or `paths` takes
-// reference: sarcl/reference/field.py:field
+// reference: sarcl/reference/equations.py:field
 
 #define REAL64 DOUBLE
 #include "common.clh"

@@ -4,7 +4,7 @@
 //   s[f, p] = sum over cells n of I_f[n] exp(-2 pi j (kappa_f (D_t - d.y_n) + rho_f,p D_r))
 //   D = |a - y| - |a| = -2 m/(1 + sqrt(1 - 2 m/R)),   m = u.y - |y|^2/(2 R),   antenna at a = R u, all from the centre
 //
-// source    B. Zou, Y. Jia and Z. Qiao, Proc. SPIE 11742 (2021), equations (4) to (6); docs/theory/full_wave.md
+// source    B. Zou, Y. Jia and Z. Qiao, Proc. SPIE 11742 (2021), equations (4) to (6); docs/theory/waveform_forming.md
 // symbols   cell      (cells, 4): y, m, and |y|^2/2, m^2;   current (n_frequencies, cells, 2): I
 //           chunk     (chunks + 1,) int: first cell of each
 //           antenna   (4, or 8 with a receiver of its own; n): u and 1/R of each pulse
@@ -16,7 +16,7 @@
 //           GROUP     work-items of a group along the pulses, which keep paths in local memory: on GPUs private arrays that
 //                     are indexed by variables lie in global memory; 0: groups of any size, paths in private memory
 //           LINEAR    1: the phase is linear in the frequency over BLOCK frequencies, and followed by complex products
-// reference: sarcl/reference/formed_echo.py:current_sums
+// reference: sarcl/reference/equations.py:current_sums
 
 #include "common.clh"
 

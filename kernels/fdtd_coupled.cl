@@ -11,7 +11,7 @@
 // It comes after the correction of the list of edges (fdtd_lists.clh), which has all places of this one.
 //
 // source    G. R. Werner and J. R. Cary, J. Comput. Phys. 226 (2007): the tensor off its diagonal at nodes, means of four
-//           edges;  docs/theory/full_wave.md
+//           edges;  docs/theory/full_wave_bodies.md
 // symbols   at        (n,) int: places in e, layout of fdtd.clh, sorted by plane;  entry  (n,) int: their numbers in the list
 //           weight    (8, n): w_b at the node before and after, w_c at the node before and after; then v; b, c: axes after a
 //           lagging   (n,): L;  keep  d

@@ -26,7 +26,7 @@
 //                   the two parts of the list of the incident wave;  wave  1: it enters in this step
 //           rows    (groups + 1) int: first entry of each group in the list of the target;  others: fdtd_lists.clh
 // macros    LANES;  ABSORB  1 where layers absorb;  LISTS  1 where work-items correct their rows
-// reference: sarcl/reference/fdtd.py:update_e, update_h, absorb, edges, faces, incident
+// reference: sarcl/reference/equations.py:update_e, update_h; sarcl/reference/fdtd.py:absorb, edges, faces, incident
 
 #include "fdtd.clh"
 #include "fdtd_lists.clh"

@@ -12,39 +12,12 @@
 //           period    q0 M0, q1 M1: cells by which the copy of the grid that a line crosses is displaced
 //           table     (TAPS/2, 2, TERMS) as interp.clh reads it
 // macros    VW        1: the lanes are the taps of a sample
-//           TAPS, TERMS   of the kernel; TILE cells per side of a tile, M0, M1 >= TILE + 2 TAPS + 4
-//           GROUPED   1: a work-group owns a tile and sums it in local memory, TILE a multiple of 8; 0: one work-item does
+//           TAPS, TERMS, TILE, GROUPED   as in grid_tile.clh;  M0, M1 >= TILE + 2 TAPS + 4
 // reference: sarcl/reference/polar_format.py:spread
 
 #include "common.clh"
 #include "interp.clh"
-
-#if GROUPED
-#include "shared_tile.clh"
-#else
-// complex numbers of one row of taps, as one vector; six taps are padded: there is no vector of twelve
-#if TAPS == 2
-#define PAIRS 2
-typedef float4 taps_v;
-#define LOAD_TAPS(p) vload4(0, p)
-#define STORE_TAPS(v, p) vstore4(v, 0, p)
-#elif TAPS == 4
-#define PAIRS 4
-typedef float8 taps_v;
-#define LOAD_TAPS(p) vload8(0, p)
-#define STORE_TAPS(v, p) vstore8(v, 0, p)
-#else
-#define PAIRS 8
-typedef float16 taps_v;
-#define LOAD_TAPS(p) vload16(0, p)
-#define STORE_TAPS(v, p) vstore16(v, 0, p)
-#endif
-
-#define ROWS (TILE + 2 * TAPS - 2)
-#define STRIDE (TILE + TAPS - 2 + PAIRS)
-#endif
-
-#define REACH (TILE + TAPS - 1) // first taps that touch a tile, along one axis
+#include "grid_tile.clh"
 
 // Samples first ... last of a line whose position on one axis, middle + n step, may lie in [low, high].
 static inline void clip(float low, float high, float middle, float step, int *first, int *last) {
@@ -79,7 +52,6 @@ static inline void along0(reach of, float t0, float d0, float period, int n_samp
     clip(of.low0 + period, of.high0 + period, t0, d0, first, last);
 }
 
-#if GROUPED
 // Whether a row may have samples in the tile.
 static inline int meets(reach of, __global const int *cell, __global const float *l, int m0, int m1, int n_samples) {
     float t0 = cell[0] + l[0], d0 = l[1] + l[2], t1 = cell[1] + l[3], d1 = l[4] + l[5];
@@ -95,7 +67,15 @@ static inline int meets(reach of, __global const int *cell, __global const float
     }
     return found;
 }
-#endif
+
+// Sample n of a row, of which a copy is displaced to where whole cell (row, column) lies in the tile.
+static inline grid_sample sample_of(int n, int row, int column, __global const float *l, __global const float *samples) {
+    grid_sample s;
+    s.row = row + first_cell(n, l[0], l[1], l[2], &s.z0);
+    s.column = column + first_cell(n, l[3], l[4], l[5], &s.z1);
+    s.value = vload2(n, samples);
+    return s;
+}
 
 typedef struct {
     int n_rows, n_samples, m0, m1, first, add;
@@ -108,30 +88,22 @@ typedef struct {
 __kernel void spread(spread_numbers given, __global const float *restrict samples, __global const int *restrict cell,
                      __global const float *restrict line, __global const float *restrict table, __global float *out) {
     int n_samples = given.n_samples, m0 = given.m0, m1 = given.m1, first = given.first;
-#if GROUPED
-    __local shared_tile tile;
-    __local int met[ITEMS]; // rows that may have samples in the tile
-    int b = get_local_id(0), a = get_local_id(1), item = a * ACROSS + b;
+    int item = ITEM;
     int base0 = TILE * (first + (int)get_global_id(1) / ACROSS), base1 = TILE * ((int)get_global_id(0) / ACROSS);
-    clear_tile(&tile, item);
-#else
-    int base0 = TILE * (first + (int)get_global_id(1)), base1 = TILE * (int)get_global_id(0);
-    float sum[2 * ROWS * STRIDE];
-    for (int i = 0; i < 2 * ROWS * STRIDE; i++) sum[i] = 0;
-#endif
+    TILE_SPACE tile_sums tile;
+    __local int met[ITEMS]; // rows that may have samples in the tile
+    clear_tile(&tile);
     int middle = n_samples / 2;
     reach of = {base0 - TAPS / 2 - 1, base0 + TILE + TAPS / 2, base1 - TAPS / 2 - 1, base1 + TILE + TAPS / 2};
     for (int p = 0; p < given.n_rows; p++) {
         __global const float *l = line + 6 * (size_t)p, *row = samples + 2 * ((size_t)p * n_samples + middle);
-#if GROUPED
-        if (p % ITEMS == 0) {
+        if (GROUPED && p % ITEMS == 0) { // items look at a row each, and the group passes over those that none meets
             barrier(CLK_LOCAL_MEM_FENCE);
             int mine = p + item;
             met[item] = mine < given.n_rows && meets(of, cell + 2 * mine, line + 6 * (size_t)mine, m0, m1, n_samples);
             barrier(CLK_LOCAL_MEM_FENCE);
         }
-        if (!met[p % ITEMS]) continue;
-#endif
+        if (GROUPED && !met[p % ITEMS]) continue;
         float t0 = cell[2 * p] + l[0], d0 = l[1] + l[2], t1 = cell[2 * p + 1] + l[3], d1 = l[4] + l[5];
         int from0, to0, from1, to1;
         periods(of.low0, of.high0, t0, d0, m0, -middle, n_samples - 1 - middle, &from0, &to0);
@@ -145,59 +117,20 @@ __kernel void spread(spread_numbers given, __global const float *restrict sample
                 float period1 = (float)q1 * m1;
                 clip(of.low1 + period1, of.high1 + period1, t1, d1, &start, &stop);
                 int shift0 = cell[2 * p] - q0 * m0 - base0, shift1 = cell[2 * p + 1] - q1 * m1 - base1;
-#if GROUPED
                 for (int n = start; n <= stop; n += ITEMS) {
-                    int many = min(ITEMS, stop - n + 1);
-                    if (item < many) {
-                        float z0, z1;
-                        int i = shift0 + first_cell(n + item, l[0], l[1], l[2], &z0);
-                        int j = shift1 + first_cell(n + item, l[3], l[4], l[5], &z1);
-                        put_sample(&tile, item, i, j, z0, z1, vload2(n + item, row), table);
-                    }
-                    barrier(CLK_LOCAL_MEM_FENCE);
-                    add_samples(&tile, many, a, b);
-                    barrier(CLK_LOCAL_MEM_FENCE);
+                    int n_added = min(ITEMS, stop - n + 1);
+                    if (item < n_added) put_sample(&tile, item, sample_of(n + item, shift0, shift1, l, row), table);
+                    add_samples(&tile, n_added);
                 }
-#else
-                for (int n = start; n <= stop; n++) {
-                    float z0, z1;
-                    int i = shift0 + TAPS - 1 + first_cell(n, l[0], l[1], l[2], &z0);
-                    int j = shift1 + TAPS - 1 + first_cell(n, l[3], l[4], l[5], &z1);
-                    if (i < 0 || i >= REACH || j < 0 || j >= REACH) continue;
-                    float w0[TAPS], w1[TAPS], pairs[2 * PAIRS];
-                    tap_weights(z0, table, w0);
-                    tap_weights(z1, table, w1);
-                    float2 s = vload2(n, row);
-#pragma unroll
-                    for (int k = 0; k < PAIRS; k++) {
-                        pairs[2 * k] = k < TAPS ? w1[k] * s.s0 : 0;
-                        pairs[2 * k + 1] = k < TAPS ? w1[k] * s.s1 : 0;
-                    }
-                    taps_v v = LOAD_TAPS(pairs);
-                    float *at = sum + 2 * (i * STRIDE + j);
-#pragma unroll
-                    for (int k = 0; k < TAPS; k++, at += 2 * STRIDE) STORE_TAPS(fma((taps_v)w0[k], v, LOAD_TAPS(at)), at);
-                }
-#endif
             }
         }
     }
-#if GROUPED
-    barrier(CLK_LOCAL_MEM_FENCE);
     for (int k = item; k < TILE * TILE; k += ITEMS) {
         int i = base0 + k / TILE, j = base1 + k % TILE;
         if (i < m0 && j < m1) {
             __global float *to = out + 2 * ((size_t)(i - TILE * first) * m1 + j);
-            float2 s = sum_of_cell(&tile, k);
+            float2 s = sum_of_cell(&tile, k / TILE, k % TILE);
             vstore2(given.add ? vload2(0, to) + s : s, 0, to);
         }
     }
-#else
-    for (int i = 0; i < TILE && base0 + i < m0; i++) {
-        __global float *to = out + 2 * ((size_t)(base0 - TILE * first + i) * m1 + base1);
-        float *from = sum + 2 * ((i + TAPS - 1) * STRIDE + TAPS - 1);
-        int n = 2 * min(TILE, m1 - base1);
-        for (int j = 0; j < n; j++) to[j] = given.add ? to[j] + from[j] : from[j];
-    }
-#endif
 }

@@ -14,20 +14,12 @@
 //           cell     first of four cells of the table over u/2k, -1: no response;  L_i  cubic Lagrange
 //           D        1 over the transform of w over rows, at nu cycles per row: polynomial in nu^2, of 9 coefficients
 // macros    VW       1
-//           TAPS, TERMS   of the interpolation kernel;  TILE  rows and columns of a tile, TILE >= TAPS, n_columns a
-//           multiple of it;  NODES  tables
-//           GROUPED  1: a work-group owns a tile and sums it in local memory, TILE a multiple of 8; 0: one work-item does
+//           TAPS, TERMS, TILE, GROUPED   as in grid_tile.clh, TILE >= TAPS, n_columns a multiple of it;  NODES  tables
 // reference: sarcl/reference/spectral_echo.py:spread, migrate
 
 #include "common.clh"
 #include "interp.clh"
-
-#if GROUPED
-#include "shared_tile.clh"
-#endif
-
-#define ROWS (TILE + 2 * TAPS - 2)
-#define REACH (TILE + TAPS - 1)
+#include "grid_tile.clh"
 
 // global size (tiles along a row, rows of tiles), times the group (8, 8) where GROUPED: a work-item, or a group, owns one
 // tile of the grid, and adds up its own scatterers and those of the tiles before it.
@@ -35,69 +27,30 @@
 __kernel void spread(__global const float *restrict amplitude, __global const int *restrict first,
                      __global const float *restrict rest, __global const int *restrict start,
                      __global const float *restrict table, int n_tiles, int first_tile, __global float *out) {
-#if GROUPED
-    __local shared_tile sums;
-    int b = get_local_id(0), a = get_local_id(1), item = a * ACROSS + b;
+    int item = ITEM;
     int column = (int)get_global_id(0) / ACROSS, band_row = (int)get_global_id(1) / ACROSS, row = first_tile + band_row;
-    clear_tile(&sums, item);
-#else
-    int column = (int)get_global_id(0), band_row = (int)get_global_id(1), row = first_tile + band_row;
-    float sum[2 * ROWS * ROWS];
-    for (int i = 0; i < 2 * ROWS * ROWS; i++) sum[i] = 0;
-#endif
+    TILE_SPACE tile_sums sums;
+    clear_tile(&sums);
     for (int across = -1; across <= 0; across++) {
         for (int along = -1; along <= 0; along++) {
             int other = column + along, wrapped = other < 0 ? n_tiles : 0;
             if (row + across < 0) continue;
-            int tile = (row + across) * n_tiles + other + wrapped;
-#if GROUPED
-            int end = start[tile + 1];
+            int tile = (row + across) * n_tiles + other + wrapped, end = start[tile + 1];
             for (int from = start[tile]; from < end; from += ITEMS) {
-                int many = min(ITEMS, end - from), k = from + item;
-                barrier(CLK_LOCAL_MEM_FENCE);
-                if (item < many)
-                    put_sample(&sums, item, first[2 * k] - TILE * row, first[2 * k + 1] - TILE * (column + wrapped),
-                               rest[2 * k], rest[2 * k + 1], vload2(k, amplitude), table);
-                barrier(CLK_LOCAL_MEM_FENCE);
-                add_samples(&sums, many, a, b);
-            }
-#else
-            for (int k = start[tile]; k < start[tile + 1]; k++) {
-                int i = first[2 * k] - TILE * row + TAPS - 1;
-                int j = first[2 * k + 1] - TILE * (column + wrapped) + TAPS - 1;
-                if (i < 0 || i >= REACH || j < 0 || j >= REACH) continue;
-                float w0[TAPS], w1[TAPS], pairs[2 * TAPS];
-                tap_weights(rest[2 * k], table, w0);
-                tap_weights(rest[2 * k + 1], table, w1);
-                float re = amplitude[2 * k], im = amplitude[2 * k + 1];
-#pragma unroll
-                for (int t = 0; t < TAPS; t++) {
-                    pairs[2 * t] = w1[t] * re;
-                    pairs[2 * t + 1] = w1[t] * im;
+                int k = from + item, n_added = min(ITEMS, end - from);
+                if (item < n_added) {
+                    grid_sample s = {first[2 * k] - TILE * row, first[2 * k + 1] - TILE * (column + wrapped),
+                                     rest[2 * k], rest[2 * k + 1], vload2(k, amplitude)};
+                    put_sample(&sums, item, s, table);
                 }
-                float *at = sum + 2 * (i * ROWS + j);
-#pragma unroll
-                for (int s = 0; s < TAPS; s++, at += 2 * ROWS) {
-#pragma unroll
-                    for (int t = 0; t < 2 * TAPS; t++) at[t] = fma(w0[s], pairs[t], at[t]);
-                }
+                add_samples(&sums, n_added);
             }
-#endif
         }
     }
     size_t width = (size_t)TILE * n_tiles;
     out += 2 * ((size_t)(TILE * band_row) * width + TILE * column);
-#if GROUPED
-    barrier(CLK_LOCAL_MEM_FENCE);
     for (int k = item; k < TILE * TILE; k += ITEMS)
-        vstore2(sum_of_cell(&sums, k), 0, out + 2 * (k / TILE * width + k % TILE));
-#else
-    for (int i = 0; i < TILE; i++) {
-        __global float *to = out + 2 * i * width;
-        float *from = sum + 2 * ((i + TAPS - 1) * ROWS + TAPS - 1);
-        for (int j = 0; j < 2 * TILE; j++) to[j] = from[j];
-    }
-#endif
+        vstore2(sum_of_cell(&sums, k / TILE, k % TILE), 0, out + 2 * (k / TILE * width + k % TILE));
 }
 
 typedef struct {

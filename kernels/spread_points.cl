@@ -10,7 +10,7 @@
 //           NODES     frequencies f_m
 //           TILE      scatterers per tile, a multiple of VW
 //           GROUPED   1: a work-group of 64 items adds a row up, in local memory, TILE a multiple of 64; 0: one work-item does
-// reference: sarcl/reference/echo.py:echo
+// reference: sarcl/reference/equations.py:point_echo
 
 #include "common.clh"
 #include "doubleword.clh"

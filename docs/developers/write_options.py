@@ -2,7 +2,7 @@
 
 sarcl/verbs/__init__.pyi  signatures of the verbs, for type checkers and editors
 docs/guide/options.md     tables of all options
-sarcl/cli/_flags.py       defaults and words of options for the parser of the command line, which must not import numpy
+sarcl/cli/flags.json      defaults and words of options for the parser of the command line, which must not import numpy
 
 tests/house/test_options_listed.py fails while these differ from what this script makes.
 """
@@ -13,6 +13,7 @@ import ast
 import builtins
 import functools
 import inspect
+import json
 import re
 import sys
 import textwrap
@@ -31,7 +32,7 @@ from sarcl.base.options import described
 from sarcl.numerics.run_options import RunOptions
 
 COMMAND = "python docs/developers/write_options.py"
-STUB, PAGE, FLAGS = "sarcl/verbs/__init__.pyi", "docs/guide/options.md", "sarcl/cli/_flags.py"
+STUB, PAGE, FLAGS = "sarcl/verbs/__init__.pyi", "docs/guide/options.md", "sarcl/cli/flags.json"
 ON_COMMAND_LINE = ("backproject", "polar_format", "range_doppler")
 PIECE = "tile"  # with this option a verb returns None while other pieces are missing
 WIDTH = 120
@@ -318,32 +319,16 @@ def _table(options: Iterable[Parameter]) -> str:
 
 
 def flags(entries: list[Verb]) -> str:
-    """The module of the command line."""
+    """The file of the command line: verb -> option -> its default, and the words that it takes, where it takes only
+    these."""
     shown = [entry for entry in entries if entry.name in ON_COMMAND_LINE]
-    defaults, words = {}, {}
-    for entry in shown:
-        defaults[entry.name] = {p.name: literal(p.default) for p in entry.options}
-        words[entry.name] = {p.name: f"({', '.join(map(literal, choices(p)))})" for p in entry.options if choices(p)}
-    return f'''"""Options of the verbs for the parser of the command line, which imports nothing that takes time.
-
-Made from the verbs' records by {COMMAND}
-"""
-
-from typing import Any
-
-# verb -> option -> its default
-DEFAULTS: dict[str, dict[str, Any]] = {_dicts(defaults)}
-# verb -> option -> the words that it takes, where it takes nothing else
-CHOICES: dict[str, dict[str, tuple[str, ...]]] = {_dicts(words)}'''
-
-
-def _dicts(values: dict[str, dict[str, str]]) -> str:
-    """A dict of dicts of texts of Python, one entry a line."""
-    text = "{\n"
-    for verb, options in values.items():
-        lines = "".join(f"        {literal(name)}: {value},\n" for name, value in options.items())
-        text += f"    {literal(verb)}: {{\n{lines}    }},\n" if lines else f"    {literal(verb)}: {{}},\n"
-    return text + "}\n"
+    tables = {
+        "defaults": {
+            entry.name: {p.name: ast.literal_eval(literal(p.default)) for p in entry.options} for entry in shown
+        },
+        "choices": {entry.name: {p.name: choices(p) for p in entry.options if choices(p)} for entry in shown},
+    }
+    return json.dumps(tables, indent=1) + "\n"
 
 
 def made(root: Path) -> dict[Path, str]:

@@ -9,7 +9,4 @@ For this folder alone:
     _image_interpolator   values of a complex image between its pixels
     _peaks                search for the brightest pixel, or for the peak near a position
     _surface              the grid, or the plane that touches a grid of listed points
-    _view                 the antennas in the middle of the rows that saw a position
 """
-
-__all__ = ["point_response"]

@@ -20,8 +20,7 @@ from ..base import validation
 from ..model.image import Image
 from ._image_interpolator import ImageInterpolator
 from ._peaks import brightest, brightest_around, peak_near, place
-from ._surface import place_of
-from ._view import ends_at
+from ._surface import ends_at, place_of
 
 if TYPE_CHECKING:
     import PIL.Image

@@ -12,5 +12,3 @@ For this folder alone:
 
     _beam_plan     number type, blocks and predicted error of beam()
 """
-
-__all__ = ["ambiguity", "array_factor", "beam", "channels", "map_aperture"]

@@ -27,30 +27,3 @@ For other folders:
     version       the version of the package
     wgs84         longitude, latitude and height to Earth-centred coordinates and back; local axes
 """
-
-__all__ = [
-    "arguments",
-    "boxes",
-    "constants",
-    "counter_rng",
-    "errors",
-    "fingerprint",
-    "float_pairs",
-    "forecast",
-    "host_memory",
-    "morton",
-    "options",
-    "progress",
-    "report",
-    "rows",
-    "stage_timer",
-    "text",
-    "threads",
-    "tolerances",
-    "types",
-    "validation",
-    "vectors",
-    "verb",
-    "version",
-    "wgs84",
-]

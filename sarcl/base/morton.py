@@ -6,18 +6,24 @@ import numpy as np
 
 from .boxes import box
 
+DEPTH = 20  # halvings of the cube's edges: cells of the curve
 BLOCK = 2**14  # points that are looked at together: so few stay in the processor's cache
 
 
 def morton_order(positions: np.ndarray) -> np.ndarray:
     """Order of points (n, 3) along the Z curve of the cube that holds them (2^20 cells along each edge)."""
+    return np.argsort(morton_codes(positions)[0], kind="stable")
+
+
+def morton_codes(positions: np.ndarray) -> tuple[np.ndarray, float]:
+    """Places of points (n, 3) on the Z curve of the cube that holds them, uint64 (n,), and the edge of that cube, m."""
     low, high = box(positions)
     extent = float((high - low).max()) or 1.0
     code = np.empty(len(positions), np.uint64)
     for first in range(0, len(code), BLOCK):
         block = slice(first, first + BLOCK)
-        code[block] = interleaved(((positions[block] - low) * ((2**20 - 1) / extent)).astype(np.uint64))
-    return np.argsort(code, kind="stable")
+        code[block] = interleaved(((positions[block] - low) * ((2**DEPTH - 1) / extent)).astype(np.uint64))
+    return code, extent
 
 
 def interleaved(cell: np.ndarray) -> np.ndarray:

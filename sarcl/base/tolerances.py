@@ -21,11 +21,12 @@ def askable(best: float) -> float | None:
     return best if best <= LARGEST_TOLERANCE else None
 
 
-def reachable(plan: Callable[[float], object], above: float) -> float | None:
+def reachable(plan: Callable[[float], object], above: float, step: float = 1.25) -> float | None:
     """The smallest tolerance found for which `plan` raises no ToleranceUnreachable; None where none is found
     that may be asked for.
 
-    The search starts at `above`. The next tolerance is the best one that the planner names, else one a quarter larger.
+    The search starts at `above`. The next tolerance is the best one that the planner names, else `step` times the last,
+    and at last the largest that is allowed.
     """
     best = rounded_up(above)
     while best <= LARGEST_TOLERANCE:
@@ -33,7 +34,9 @@ def reachable(plan: Callable[[float], object], above: float) -> float | None:
             plan(best)
         except ToleranceUnreachable as refused:
             named = 0.0 if refused.best is None else refused.best * best / refused.asked
-            best = rounded_up(named if named > best else 1.25 * best)
+            if best == LARGEST_TOLERANCE:
+                return None
+            best = rounded_up(named) if named > best else min(rounded_up(step * best), LARGEST_TOLERANCE)
         else:
             return best
     return None

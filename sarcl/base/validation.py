@@ -225,3 +225,12 @@ def choice(name: str, value: Any, allowed: tuple[str, ...]) -> str:
             f"{name} is {' '.join(repr(value).split()):.60}; choose one of {', '.join(map(repr, allowed))}"
         )
     return str(value)
+
+
+def pair(name: str, value: Any) -> tuple[Any, Any]:
+    """A (row, column) pair, from a pair or one number for both."""
+    if ndim(name, value) == 0:
+        return value, value
+    if np.shape(value) != (2,):
+        raise ValueError(f"{name} is {value!r}; wanted (row, column) or one number for both")
+    return value[0], value[1]

@@ -33,8 +33,7 @@ def ecef(longitude: ArrayLike, latitude: ArrayLike, height: ArrayLike) -> NDArra
     normal = SEMI_MAJOR / np.sqrt(1 - ECCENTRICITY_SQUARED * s**2)  # radius of curvature in the prime vertical
     across = (normal + height) * c
     return np.stack(
-        np.broadcast_arrays(across * cosine, across * sine, (normal * (1 - ECCENTRICITY_SQUARED) + height) * s),
-        axis=-1,
+        np.broadcast_arrays(across * cosine, across * sine, (normal * (1 - ECCENTRICITY_SQUARED) + height) * s), axis=-1
     )
 
 

@@ -20,5 +20,3 @@ For this folder alone:
     _run_sarcl     sarcl as a competitor
     _wait_idle     waits until other programs leave the processors idle
 """
-
-__all__ = ["backproject", "exact", "fastsar_peer", "one_shot", "pareto", "ratios", "tables"]

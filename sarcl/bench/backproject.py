@@ -21,120 +21,108 @@ from ..base.version import __version__
 from ..imaging.choose_method import METHODS
 from ..opencl import device_list
 from ..opencl.choose_device import open_device
-from ..opencl.device import Device
-from . import _baseline, _cases, _competitor, _peers, _run_sarcl, tables
-from ._competitor import Absent
+from ..opencl.device import Device, DeviceChoice
+from . import _baseline, _cases, _peers, _run_sarcl, tables
+from ._competitor import Absent, Competitor
 from ._measure import Paces, alternate, measure
 
 TOLERANCES = (1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 1e-5, 1e-6)
 FORMAT = 2  # version of the document
+FACTS = ("index", "name", "platform", "driver", "kind", "fp64", "units")  # of a device, in a document
 Document = dict[str, Any]
 
 
-@dataclass(frozen=True)
-class _Effort:
-    """Runs of each row, pixels checked, and seconds: the longest run, and the wait until no other program runs."""
+@dataclass(frozen=True, kw_only=True)
+class Setting:
+    """What is measured, and how.
 
-    repeats: int
-    pixels: int
-    limit: float
-    patience: float
+    scenes, data   see `_cases.make`;  sizes  pulses = samples = pixels a side, at least 8
+    tolerances     relative errors, above 0;  methods  "direct", "factorized", "auto"
+    devices        as `sarcl.devices` names them; None: all that work;  no_fp64  measure each again without float64
+    peer_python    an interpreter that has fastsar, default this one;  peer_backend  which of its backends
+    with_peers     NumPy and fastsar are measured too
+    repeats        runs of each row, in turns;  pixels  number of pixels checked against the exact sum, at least 256
+    limit          s; runs expected to last longer are left out
+    patience       s to wait before each run until no other program runs
+    ValueError for what does not fit.
+    """
+
+    scenes: Sequence[str] = _cases.SCENES
+    sizes: Sequence[int] = (1024,)
+    tolerances: Sequence[float] = TOLERANCES
+    devices: Sequence[DeviceChoice | None] | None = None
+    no_fp64: bool = False
+    methods: Sequence[str] = ("direct", "factorized")
+    data: str | None = None
+    peer_python: str | None = None
+    peer_backend: str = "cpu"
+    with_peers: bool = True
+    repeats: int = 5
+    pixels: int = 1024
+    limit: float = 120.0
+    patience: float = 0.0
+
+    def __post_init__(self) -> None:
+        for scene in self.scenes:
+            choice("scene", scene, _cases.SCENES)
+        for method in self.methods:
+            choice("method", method, METHODS)
+        checked = {
+            "tolerances": [number(f"tolerances[{i}]", t, above=0) for i, t in enumerate(self.tolerances)],
+            "sizes": sorted({count(f"sizes[{i}]", n, least=8) for i, n in enumerate(self.sizes)}),
+            "repeats": count("repeats", self.repeats),
+            "pixels": count("pixels", self.pixels, least=256),
+            "limit": number("limit", self.limit, above=0),
+            "patience": number("patience", self.patience, least=0),
+            "peer_python": _peers.check_python(self.peer_python),
+        }
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
 
 
 def run(
-    *,
-    scenes: Sequence[str] = _cases.SCENES,
-    sizes: Sequence[int] = (1024,),
-    tolerances: Sequence[float] = TOLERANCES,
-    devices: Sequence[Any] | None = None,
-    no_fp64: bool = False,
-    methods: Sequence[str] = ("direct", "factorized"),
-    data: str | None = None,
-    peer_python: str | None = None,
-    peer_backend: str = "cpu",
-    with_peers: bool = True,
-    repeats: int = 5,
-    pixels: int = 1024,
-    limit: float = 120.0,
-    patience: float = 0.0,
-    say: Callable[[str], None] = lambda text: None,
+    *, say: Callable[[str], None] = lambda text: None,
     progress: Callable[[str, int, int], None] = lambda stage, done, total: None,
-    keep: Callable[[Document], None] = lambda document: None,
-) -> Document:
+    keep: Callable[[Document], None] = lambda document: None, **options: Any,
+) -> Document:  # fmt: skip
     """Measure; returns a document ready for JSON.
 
-    scenes, data   see `_cases.make`; sizes: pulses = samples = pixels a side, at least 8
-    devices        as `sarcl.devices` names them; None: all that work;  no_fp64: measure each again without float64
-    methods        "direct", "factorized", "auto"
-    peer_python    an interpreter that has fastsar, default this one; peer_backend: which of its backends
-    repeats        runs of each row, in turns;  pixels: number of pixels checked against the exact sum, at least 256
-    limit          s; runs expected to last longer are left out
-    patience       s to wait before each run until no other program runs
-    say, progress  lines of text; progress(stage, done, total); keep(document) after every case
-    ValueError for what does not fit, before the work; NoDeviceError.
+    say, progress  lines of text; progress(stage, done, total);  keep(document) is called after every case
+    options        those of a Setting. ValueError for what does not fit, before the work; NoDeviceError.
     """
-    for scene in scenes:
-        choice("scene", scene, _cases.SCENES)
-    for method in methods:
-        choice("method", method, METHODS)
-    errors = [number(f"tolerances[{i}]", t, above=0) for i, t in enumerate(tolerances)]
-    sizes = sorted({count(f"sizes[{i}]", n, least=8) for i, n in enumerate(sizes)})
-    effort = _Effort(
-        count("repeats", repeats),
-        count("pixels", pixels, least=256),
-        number("limit", limit, above=0),
-        number("patience", patience, least=0),
-    )
-    python = _peers.check_python(peer_python)
-    opened = _opened_devices(devices, no_fp64)
+    setting = Setting(**options)
+    opened = _opened_devices(setting.devices, setting.no_fp64)
     document: Document = {**header(opened), "cases": []}
     with ExitStack() as stack:
         peer = None
-        if with_peers:
-            peer, description = _opened_peer(stack, python, peer_backend)
+        if setting.with_peers:
+            peer, description = _opened_peer(stack, str(setting.peer_python), setting.peer_backend)
             document["peers"].append(description)
         for line in tables.machine_text(document):
             say(line)
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="sarcl-bench-")))
-        for scene in scenes:
+        for scene in setting.scenes:
             paces: Paces = {}
-            for n in sizes:
+            for n in setting.sizes:
                 progress("data", 0, 1)
-                case = _cases.make(scene, n, data, effort.pixels)
+                case = _cases.make(scene, n, setting.data, setting.pixels)
                 _cases.save(case, folder)
                 progress("data", 1, 1)
-                lines = _run_sarcl.competitors(case, folder, opened, methods, errors)
-                others = _others(case, folder, peer, peer_backend, methods) if with_peers else []
-                result = _result(case, alternate(lines, others), effort, paces, functools.partial(progress, "bench"))
-                document["cases"].append(result)
+                lines = _run_sarcl.competitors(case, folder, opened, setting.methods, setting.tolerances)
+                others = _others(case, folder, peer, setting) if setting.with_peers else []
+                rows = measure(
+                    case, alternate(lines, others), repeats=setting.repeats, limit=setting.limit, paces=paces,
+                    patience=setting.patience, tick=functools.partial(progress, "bench"),
+                )  # fmt: skip
+                result = {"scene": case.scene, "data": case.data, "n": case.n, "pairs": case.pairs}
+                norm = float(np.linalg.norm(case.wanted)) / case.norm
+                document["cases"].append({**result, "pixels": setting.pixels, "norm": norm, "rows": rows})
                 document["machine"]["load"] = [document["machine"]["load"][0], *load()]
                 keep(document)
-                say("\n" + tables.text(result))
+                say("\n" + tables.text(document["cases"][-1]))
     for paragraph in filter(None, (tables.growth_text(document["cases"]), tables.EXPLAINED)):
         say("\n" + paragraph)
     return document
-
-
-def _result(
-    case: _cases.BenchCase,
-    competitors: list[_competitor.Competitor],
-    effort: _Effort,
-    paces: Paces,
-    tick: Callable[[int, int], None],
-) -> dict[str, Any]:
-    """The entry of a case in the document, measured."""
-    rows = measure(
-        case,
-        competitors,
-        repeats=effort.repeats,
-        limit=effort.limit,
-        paces=paces,
-        patience=effort.patience,
-        tick=tick,
-    )
-    norm = float(np.linalg.norm(case.wanted)) / case.norm
-    setting = {"scene": case.scene, "data": case.data, "n": case.n, "pairs": case.pairs, "pixels": effort.pixels}
-    return {**setting, "norm": norm, "rows": rows}
 
 
 def _opened_peer(stack: ExitStack, python: str, backend: str) -> tuple[_peers.Peer | None, dict[str, str]]:
@@ -146,11 +134,9 @@ def _opened_peer(stack: ExitStack, python: str, backend: str) -> tuple[_peers.Pe
     return peer, {"name": "fastsar", "version": peer.version, "python": peer.python, "backend": backend}
 
 
-def _others(
-    case: _cases.BenchCase, folder: Path, peer: _peers.Peer | None, backend: str, methods: Sequence[str]
-) -> list[Any]:
+def _others(case: _cases.BenchCase, folder: Path, peer: _peers.Peer | None, setting: Setting) -> list[Competitor]:
     """The NumPy baseline, and the peer where there is one."""
-    others = []
+    others, backend, methods = [], setting.peer_backend, setting.methods
     if "direct" in methods:
         others += _baseline.competitors(case)
     if peer is not None:
@@ -163,11 +149,11 @@ def _others(
             def gone() -> NoReturn:
                 raise Absent(lost)
 
-            others += [_competitor.Competitor(peer.name, backend, method, "any", gone) for method in methods]
+            others += [Competitor(peer.name, backend, method, "any", gone) for method in methods]
     return others
 
 
-def _opened_devices(devices: Sequence[Any] | None, no_fp64: bool) -> list[Device]:
+def _opened_devices(devices: Sequence[DeviceChoice | None] | None, no_fp64: bool) -> list[Device]:
     """The devices, all that work by default, and with no_fp64 a twin without float64 of each that has it."""
     if not devices:
         devices = [info.index for info in device_list.devices() if info.works] or [None]
@@ -175,22 +161,14 @@ def _opened_devices(devices: Sequence[Any] | None, no_fp64: bool) -> list[Device
     return opened + [device.without_fp64() for device in opened if no_fp64 and device.info.fp64]
 
 
-def _device(device: Device) -> dict[str, Any]:
-    info = device.info
-    return {
-        "index": info.index,
-        "name": info.name,
-        "platform": info.platform,
-        "driver": info.driver,
-        "kind": info.kind,
-        "fp64": info.fp64,
-        "units": info.units,
-    }
-
-
 def header(devices: Sequence[Device]) -> Document:
     """The first entries of every document: machine, devices, an empty list of peers."""
-    return {"format": FORMAT, "machine": _machine(), "devices": [_device(d) for d in devices], "peers": []}
+    return {
+        "format": FORMAT,
+        "machine": _machine(),
+        "devices": [{name: getattr(d.info, name) for name in FACTS} for d in devices],
+        "peers": [],
+    }
 
 
 def load() -> list[float]:

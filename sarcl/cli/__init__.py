@@ -12,5 +12,3 @@ For this folder alone:
     _methods    the methods of sarcl focus: options, plan, image
     _pages      sarcl fda, papers and bench: pages and tables
 """
-
-__all__ = ["parser"]

@@ -31,16 +31,8 @@ def run(args: argparse.Namespace, outputs: Outputs) -> int:
     """Run the command in `args`; `outputs` gets what each output path is before the work."""
     logging.basicConfig(level=logging.INFO if args.verbose else logging.WARNING, format="sarcl: %(message)s")
     warnings.showwarning = _show_warning
-    command: Callable[[argparse.Namespace, Job], int] = {
-        "devices": devices,
-        "demo": demo,
-        "simulate": simulate,
-        "focus": focus,
-        "measure": measure,
-        "fda": fda,
-        "papers": papers,
-        "bench": bench,
-    }[args.command]
+    commands = (devices, demo, simulate, focus, measure, fda, papers, bench)
+    command = {function.__name__: function for function in commands}[args.command]
     with Job(outputs) as job:
         return command(args, job)
 
@@ -66,14 +58,7 @@ def demo(args: argparse.Namespace, job: Job) -> int:
 
     for path in demo_scene.outputs(args.out):
         job.expect(path)
-    demo_scene.run(
-        args.out,
-        quick=args.quick,
-        device=args.device,
-        seed=args.seed,
-        progress=job.progress,
-        say=job.say,
-    )
+    demo_scene.run(args.out, quick=args.quick, device=args.device, seed=args.seed, progress=job.progress, say=job.say)
     return 0
 
 
@@ -117,12 +102,7 @@ def simulate(args: argparse.Namespace, job: Job) -> int:
         if grid is None and scenario.needs_grid:
             grid = _default_grid(raw, job, scenario.default_grid_options())
         _check_room(grid, images)
-        _focus(
-            lambda out: scenario.focus(raw, grid, out=out, progress=job.progress, **options),
-            images,
-            args,
-            job,
-        )
+        _focus(lambda out: scenario.focus(raw, grid, out=out, progress=job.progress, **options), images, args, job)
     return 0
 
 

@@ -29,6 +29,7 @@ environment: SARCL_DEVICE (default of --device), SARCL_THREADS (threads of CPU d
 exit status: 0 done, 1 something failed, 2 bad input, 3 no working OpenCL device, 130 interrupted,
 143 ended by SIGTERM."""
 
+IMAGES = formats.suggested(formats.writing("picture", "image"))  # endings of files that images are written to
 FAILED, BAD_INPUT, NO_DEVICE, INTERRUPTED, ENDED = 1, 2, 3, 130, 143
 
 
@@ -41,6 +42,24 @@ class _Parser(argparse.ArgumentParser):
         self.exit(BAD_INPUT, f"sarcl: error: {message} (see {self.prog} --help)\n")
 
 
+def _add(group: Any, words: str, text: str, kind: Any = None, **options: Any) -> None:
+    """Add an option: its names and what follows them, as "-o --output PATH", its help, and what a value becomes."""
+    names = [word for word in words.split() if word.startswith("-")] or words.split()[:1]
+    values = tuple(words.split()[len(names) :])
+    if len(values) > 1:
+        options |= {"nargs": len(values), "metavar": values}
+    elif values:
+        options["metavar"] = values[0]
+    if kind is not None:
+        options["type"] = kind
+    group.add_argument(*names, help=text, **options)
+
+
+def _flag(group: Any, words: str, text: str) -> None:
+    """Add an option without a value."""
+    _add(group, words, text, action="store_true")
+
+
 def parser() -> argparse.ArgumentParser:
     """The parser of all commands."""
     top = _Parser(
@@ -51,12 +70,10 @@ def parser() -> argparse.ArgumentParser:
     )
     top.add_argument("--version", action=_Version, nargs=0, help="print the version and stop")
     common = _Parser(add_help=False)
-    common.add_argument("--debug", action="store_true", help="show the traceback of an error")
-    common.add_argument("-v", "--verbose", action="store_true", help="print more about the run")
+    _flag(common, "--debug", "show the traceback of an error")
+    _flag(common, "-v --verbose", "print more about the run")
     device = _Parser(add_help=False)
-    device.add_argument(
-        "--device", metavar="NAME", help="part of a device's name, its number, cpu or gpu (see sarcl devices)"
-    )
+    _add(device, "--device NAME", "part of a device's name, its number, cpu or gpu (see sarcl devices)")
     commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True)
 
     def command(name: str, text: str, *parents: _Parser) -> argparse.ArgumentParser:
@@ -65,69 +82,43 @@ def parser() -> argparse.ArgumentParser:
         )
 
     command("devices", "list the OpenCL devices: which work, which do not and why")
-    _demo(command("demo", "simulate the echoes of a scene, focus them and write the picture", device))
+    demo = command("demo", "simulate the echoes of a scene, focus them and write the picture", device)
+    _add(demo, "--out DIR", "folder for the results, made if missing (default out)", default="out")
+    _flag(demo, "--quick", "half the resolution, in a few seconds")
+    _add(demo, "--seed", "seed of the random scene (default 0)", int, default=0)
     _simulate(command("simulate", "make the echoes that a scenario file describes, and their image", device))
     _focus(command("focus", "turn echoes into an image: backprojection, polar_format or range_doppler", device))
     measure = command("measure", "measure a point response: resolution and side lobes")
-    measure.add_argument(
-        "image", metavar="IMAGE", help=f"image that sarcl wrote ({formats.suggested(formats.writing('image'))})"
-    )
-    measure.add_argument(
-        "--near", nargs=3, type=float, action="append", metavar=("X", "Y", "Z"),
-        help="m; default the brightest pixel; once per point",
-    )  # fmt: skip
-    measure.add_argument("--plot", metavar="FILE.png", help="draw the cuts in range and cross-range, of one point")
-    _fda(
-        command(
-            "fda",
-            "compare aperture mappings of frequency-diverse arrays with a conventional antenna: page and JSON",
-            device,
-        )
-    )
-    _papers(
-        command(
-            "papers",
-            "list the reproduced papers, or reproduce one (farooq, saras, wan, zou): published and measured values",
-            device,
-        )
-    )
+    _add(measure, "image IMAGE", f"image that sarcl wrote ({formats.suggested(formats.writing('image'))})")
+    _add(measure, "--near X Y Z", "m; default the brightest pixel; once per point", float, action="append")
+    _add(measure, "--plot FILE.png", "draw the cuts in range and cross-range, of one point")
+    text = "compare aperture mappings of frequency-diverse arrays with a conventional antenna: page and JSON"
+    fda = command("fda", text, device)
+    _add(fda, "experiment FILE.toml", "cases to run (docs/guide/fda.md)")
+    _add(fda, "-o --output PATH", "the page, default FILE.html, with FILE.json beside it")
+    text = "list the reproduced papers, or reproduce one (farooq, saras, wan, zou): published and measured values"
+    papers = command("papers", text, device)
+    _add(papers, "paper NAME", "farooq, saras, wan or zou (docs/guide/papers.md); none: list the papers", nargs="?")
+    _add(papers, "-o --output PATH", "the page, or a folder for it, default NAME.html, with NAME.json beside it")
+    _flag(papers, "--quick", "compute less: smaller fields, fewer elements and looks; the page says what")
     _bench(command("bench", "measure run time against achieved error, with peers on the same data"))
     return top
 
 
-def _demo(p: argparse.ArgumentParser) -> None:
-    p.add_argument("--out", default="out", metavar="DIR", help="folder for the results, made if missing (default out)")
-    p.add_argument("--quick", action="store_true", help="half the resolution, in a few seconds")
-    p.add_argument("--seed", type=int, default=0, help="seed of the random scene (default 0)")
-
-
 def _simulate(p: argparse.ArgumentParser) -> None:
-    images = formats.suggested(formats.writing("picture", "image"))
-    p.add_argument("scenario", metavar="FILE.toml", help="scenario, see docs/guide/scenarios.md")
-    p.add_argument("-o", "--output", metavar="RAW.h5", help="echoes (default: the scenario's name with _raw.h5, here)")
-    p.add_argument(
-        "--image",
-        action="append",
-        default=[],
-        metavar="IMAGE",
-        help=f"focus too and write {images}; repeatable (default, where there is a grid: FILE.png)",
-    )
-    p.add_argument("--tolerance", type=float, help="relative error allowed, instead of the scenario's")
-    p.add_argument("--dry-run", action="store_true", help="print size, time and error of the echoes, and write nothing")
+    images = f"focus too and write {IMAGES}; repeatable (default, where there is a grid: FILE.png)"
+    _add(p, "scenario FILE.toml", "scenario, see docs/guide/scenarios.md")
+    _add(p, "-o --output RAW.h5", "echoes (default: the scenario's name with _raw.h5, here)")
+    _add(p, "--image IMAGE", images, action="append", default=[])
+    _add(p, "--tolerance", "relative error allowed, instead of the scenario's", float)
+    _flag(p, "--dry-run", "print size, time and error of the echoes, and write nothing")
     _picture(p)
 
 
 def _focus(p: argparse.ArgumentParser) -> None:
-    images = formats.suggested(formats.writing("picture", "image"))
-    p.add_argument("raw", nargs="+", metavar="RAW", help=f"{formats.readable('or')}; several are joined")
-    p.add_argument(
-        "-o",
-        "--output",
-        action="append",
-        default=[],
-        metavar="IMAGE",
-        help=f"image to write, {images}; repeatable (default: RAW's name with .png, here)",
-    )
+    images = f"image to write, {IMAGES}; repeatable (default: RAW's name with .png, here)"
+    _add(p, "raw RAW", f"{formats.readable('or')}; several are joined", nargs="+")
+    _add(p, "-o --output IMAGE", images, action="append", default=[])
     _focus_grid(p)
     _focus_method(p)
     _focus_ground(p)
@@ -139,79 +130,64 @@ def _focus(p: argparse.ArgumentParser) -> None:
 def _focus_grid(p: argparse.ArgumentParser) -> None:
     """Options of the grid."""
     where = p.add_argument_group("grid", "default: chosen from the data, and printed")
-    where.add_argument("--grid", metavar="FILE.toml", help="take the grid from the [grid.*] table of a scenario file")
-    where.add_argument("--center", nargs=3, type=float, metavar=("X", "Y", "Z"), help="centre of the grid, m")
-    where.add_argument("--shape", nargs=2, type=int, metavar=("ROWS", "COLUMNS"), help="number of pixels")
-    where.add_argument(
-        "--spacing", nargs=2, type=float, metavar=("DY", "DX"), help="distance of rows and of columns, m"
-    )
-    where.add_argument(
-        "--normal", nargs=3, type=float, metavar=("NX", "NY", "NZ"), help="normal of the plane (default 0 0 1)"
-    )
-    where.add_argument(
-        "--x-axis", nargs=3, type=float, metavar=("X", "Y", "Z"), help="direction of columns (default 1 0 0)"
-    )
+    _add(where, "--grid FILE.toml", "take the grid from the [grid.*] table of a scenario file")
+    _add(where, "--center X Y Z", "centre of the grid, m", float)
+    _add(where, "--shape ROWS COLUMNS", "number of pixels", int)
+    _add(where, "--spacing DY DX", "distance of rows and of columns, m", float)
+    _add(where, "--normal NX NY NZ", "normal of the plane (default 0 0 1)", float)
+    _add(where, "--x-axis X Y Z", "direction of columns (default 1 0 0)", float)
 
 
 def _focus_method(p: argparse.ArgumentParser) -> None:
     """Options of the method."""
     how = p.add_argument_group("focusing")
     default, of_fast = (f"{DEFAULTS[verb]['tolerance']:g}" for verb in ("backproject", "polar_format"))
-    how.add_argument(
-        "--tolerance",
-        type=float,
-        help=f"relative error allowed (default {default}; polar_format, range_doppler: {of_fast})",
+    _add(
+        how, "--tolerance", f"relative error allowed (default {default}; polar_format, range_doppler: {of_fast})", float
     )
-    how.add_argument(
+    _add(
+        how,
         "--method",
+        "backprojection (default auto: the cheaper of direct and factorized); polar_format: plane wavefronts; "
+        "range_doppler: straight tracks and orbits, by zero-Doppler time and slant range",
         choices=[*CHOICES["backproject"]["method"], "polar_format", "range_doppler"],
         default=DEFAULTS["backproject"]["method"],
-        help="backprojection (default auto: the cheaper of direct and factorized); polar_format: plane wavefronts; "
-        "range_doppler: straight tracks and orbits, by zero-Doppler time and slant range",
     )
-    how.add_argument("--dry-run", action="store_true", help="print method, time, memory and error, and focus nothing")
-    how.add_argument(
+    _flag(how, "--dry-run", "print method, time, memory and error, and focus nothing")
+    _add(
+        how,
         "--window",
-        type=window,
-        help="hamming, taylor:SIDELOBE_DB:NBAR such as taylor:35:5, hann, kaiser:8.6 ...; or RANGE,CROSS-RANGE",
+        "hamming, taylor:SIDELOBE_DB:NBAR such as taylor:35:5, hann, kaiser:8.6 ...; or RANGE,CROSS-RANGE",
+        window,
     )
-    how.add_argument(
-        "--beam",
-        type=degrees,
-        metavar="DEG",
-        help="full angle of the transmit beam, pointed at the grid's centre; range_doppler: of the azimuth beam",
+    _add(
+        how,
+        "--beam DEG",
+        "full angle of the transmit beam, pointed at the grid's centre; range_doppler: of the azimuth beam",
+        degrees,
     )
-    how.add_argument(
+    _add(
+        how,
         "--mapping",
+        "map the echoes of a frequency-diverse array first (docs/guide/fda.md)",
         choices=CHOICES["backproject"]["mapping"],
-        help="map the echoes of a frequency-diverse array first (docs/guide/fda.md)",
     )
-    how.add_argument("--wrap", action="store_true", help="repeat ranges outside the unambiguous swath")
-    how.add_argument("--max-bytes", type=size, metavar="SIZE", help="memory for blocks on the device, e.g. 2G")
+    _flag(how, "--wrap", "repeat ranges outside the unambiguous swath")
+    _add(how, "--max-bytes SIZE", "memory for blocks on the device, e.g. 2G", size)
 
 
 def _focus_ground(p: argparse.ArgumentParser) -> None:
     """Options of the ground that is seen, and of range_doppler."""
     earth = p.add_argument_group("echoes of orbits, and range_doppler", "docs/guide/range_doppler.md")
-    earth.add_argument(
-        "--heights",
-        metavar="H|DEM",
-        help="of pixels: m above the ellipsoid (local tracks: z), or a DEM (default 0)",
-    )
-    earth.add_argument("--heights-above", metavar="NAME", help="what a DEM's heights are above: ellipsoid, EGM96 ...")
-    earth.add_argument("--geoid", metavar="M|FILE", help="height of that geoid above the ellipsoid, m, or its raster")
-    earth.add_argument("--side", choices=CHOICES["range_doppler"]["side"], help="side of the track, seen from above")
-    earth.add_argument("--times", nargs=2, type=float, metavar=("FIRST", "LAST"), help="zero-Doppler times, s")
-    earth.add_argument("--ranges", nargs=2, type=float, metavar=("NEAR", "FAR"), help="slant ranges, m")
-    earth.add_argument(
-        "--doppler", type=doppler, metavar="HZ|data", help="Doppler centroid (default: from the geometry)"
-    )
-    earth.add_argument(
-        "--near", type=float, metavar="HZ", help="of --doppler data: the centroid nearest to this (default: geometry's)"
-    )
-    earth.add_argument(
-        "--doppler-rate", type=doppler, metavar="HZ/S|data", help="Doppler rate (default: from the geometry)"
-    )
+    _add(earth, "--heights H|DEM", "of pixels: m above the ellipsoid (local tracks: z), or a DEM (default 0)")
+    _add(earth, "--heights-above NAME", "what a DEM's heights are above: ellipsoid, EGM96 ...")
+    _add(earth, "--geoid M|FILE", "height of that geoid above the ellipsoid, m, or its raster")
+    _add(earth, "--side", "side of the track, seen from above", choices=CHOICES["range_doppler"]["side"])
+    _add(earth, "--times FIRST LAST", "zero-Doppler times, s", float)
+    _add(earth, "--ranges NEAR FAR", "slant ranges, m", float)
+    _add(earth, "--doppler HZ|data", "Doppler centroid (default: from the geometry)", doppler)
+    _add(earth, "--near HZ", "of --doppler data: the centroid nearest to this (default: geometry's)", float)
+    _add(earth, "--doppler-rate HZ/S|data", "Doppler rate (default: from the geometry)", doppler)
 
 
 def _focus_pieces(p: argparse.ArgumentParser) -> None:
@@ -219,90 +195,58 @@ def _focus_pieces(p: argparse.ArgumentParser) -> None:
     large = p.add_argument_group(
         "large images", "finished tiles of an IMAGE.h5 wait in IMAGE.h5.parts; --device all uses every device"
     )
-    large.add_argument(
-        "--tile", type=piece, metavar="I/N", help="make piece I of N alone; the last to finish puts the image together"
-    )
-    large.add_argument(
+    _add(large, "--tile I/N", "make piece I of N alone; the last to finish puts the image together", piece)
+    _add(
+        large,
         "--resume",
+        "keep finished tiles whatever ends the run (default: when it is killed), or --no-resume: start again",
         action=argparse.BooleanOptionalAction,
-        help="keep finished tiles whatever ends the run (default: when it is killed), or --no-resume: start again",
     )
 
 
 def _focus_rows(p: argparse.ArgumentParser) -> None:
     """Options that choose rows of the echoes."""
     rows = p.add_argument_group("data")
-    rows.add_argument("--polarization", metavar="PQ", help="only rows of this polarisation, e.g. HV")
-    rows.add_argument("--sum-polarizations", action="store_true", help="add rows of several polarisations coherently")
-    rows.add_argument("--channel", type=int, metavar="N", help="only rows of this receive channel")
-    rows.add_argument("--autofocus", action="store_true", help="apply the corrections a Gotcha file holds")
+    _add(rows, "--polarization PQ", "only rows of this polarisation, e.g. HV")
+    _flag(rows, "--sum-polarizations", "add rows of several polarisations coherently")
+    _add(rows, "--channel N", "only rows of this receive channel", int)
+    _flag(rows, "--autofocus", "apply the corrections a Gotcha file holds")
 
 
 def _picture(p: argparse.ArgumentParser) -> None:
     grey = p.add_argument_group("grey levels of a .png", "its caption says what white and black are")
-    grey.add_argument("--floor-db", type=float, default=-50.0, metavar="DB", help="black, dB below white (default -50)")
+    _add(grey, "--floor-db DB", "black, dB below white (default -50)", float, default=-50.0)
     white = grey.add_mutually_exclusive_group()
-    white.add_argument("--top-db", type=float, metavar="DB", help="white, dB of a unit point in focus")
-    white.add_argument(
-        "--percentile",
-        type=float,
-        metavar="P",
-        help="white: this percentile of the scene's pixels (default 99.5; 100: the brightest pixel)",
-    )
-
-
-def _fda(p: argparse.ArgumentParser) -> None:
-    p.add_argument("experiment", metavar="FILE.toml", help="cases to run (docs/guide/fda.md)")
-    p.add_argument("-o", "--output", metavar="PATH", help="the page, default FILE.html, with FILE.json beside it")
-
-
-def _papers(p: argparse.ArgumentParser) -> None:
-    p.add_argument(
-        "paper",
-        nargs="?",
-        metavar="NAME",
-        help="farooq, saras, wan or zou (docs/guide/papers.md); none: list the papers",
-    )
-    p.add_argument(
-        "-o",
-        "--output",
-        metavar="PATH",
-        help="the page, or a folder for it, default NAME.html, with NAME.json beside it",
-    )
-    p.add_argument(
-        "--quick",
-        action="store_true",
-        help="compute less: smaller fields, fewer elements and looks; the page says what",
+    _add(white, "--top-db DB", "white, dB of a unit point in focus", float)
+    _add(
+        white,
+        "--percentile P",
+        "white: this percentile of the scene's pixels (default 99.5; 100: the brightest pixel)",
+        float,
     )
 
 
 def _bench(p: argparse.ArgumentParser) -> None:
-    p.add_argument("what", nargs="?", choices=["backproject"], default="backproject", help="what to measure")
-    p.add_argument("--json", metavar="FILE", help="write all measurements, .json")
-    p.add_argument("--picture", metavar="FILE", help="plot rate against error, .png (needs the extra plots)")
+    _add(p, "what", "what to measure", choices=["backproject"], default="backproject", nargs="?")
+    _add(p, "--json FILE", "write all measurements, .json")
+    _add(p, "--picture FILE", "plot rate against error, .png (needs the extra plots)")
     what = p.add_argument_group("what is measured")
-    what.add_argument("--scenes", nargs="+", choices=["spotlight", "straight"], help="tracks (default both)")
-    what.add_argument("--data", choices=["noise", "points"], help="default noise for spotlight, points for straight")
-    what.add_argument("--sizes", nargs="+", type=int, metavar="N", help="pulses, samples, image side (default 1024)")
-    what.add_argument("--tolerances", nargs="+", type=float, metavar="T", help="default 1e-1 to 1e-6")
-    what.add_argument(
-        "--methods", nargs="+", choices=["direct", "factorized", "auto"], help="default direct factorized"
-    )
-    what.add_argument("--devices", nargs="+", metavar="NAME", help="as --device elsewhere (default all that work)")
-    what.add_argument("--no-fp64", action="store_true", help="measure each device again without float64")
+    _add(what, "--scenes", "tracks (default both)", choices=["spotlight", "straight"], nargs="+")
+    _add(what, "--data", "default noise for spotlight, points for straight", choices=["noise", "points"])
+    _add(what, "--sizes N", "pulses, samples, image side (default 1024)", int, nargs="+")
+    _add(what, "--tolerances T", "default 1e-1 to 1e-6", float, nargs="+")
+    _add(what, "--methods", "default direct factorized", choices=["direct", "factorized", "auto"], nargs="+")
+    _add(what, "--devices NAME", "as --device elsewhere (default all that work)", nargs="+")
+    _flag(what, "--no-fp64", "measure each device again without float64")
     peer = p.add_argument_group("peers")
-    peer.add_argument("--peer-python", metavar="PATH", help="a Python that has fastsar (default this one)")
-    peer.add_argument("--peer-backend", choices=["cpu", "cuda", "jax", "auto"], help="fastsar's (default cpu)")
-    peer.add_argument("--no-peers", action="store_true", help="measure sarcl alone, without NumPy and fastsar")
+    _add(peer, "--peer-python PATH", "a Python that has fastsar (default this one)")
+    _add(peer, "--peer-backend", "fastsar's (default cpu)", choices=["cpu", "cuda", "jax", "auto"])
+    _flag(peer, "--no-peers", "measure sarcl alone, without NumPy and fastsar")
     how = p.add_argument_group("how")
-    how.add_argument("--repeats", type=int, metavar="K", help="runs of each, alternating (default 5)")
-    how.add_argument(
-        "--pixels", type=int, metavar="K", help="pixels checked against the exact sum, at least 256 (default 1024)"
-    )
-    how.add_argument("--limit", type=float, metavar="S", help="leave out runs that would take longer, s (default 120)")
-    how.add_argument(
-        "--patience", type=float, metavar="S", help="wait up to so long for an idle machine, s (default 0)"
-    )
+    _add(how, "--repeats K", "runs of each, alternating (default 5)", int)
+    _add(how, "--pixels K", "pixels checked against the exact sum, at least 256 (default 1024)", int)
+    _add(how, "--limit S", "leave out runs that would take longer, s (default 120)", float)
+    _add(how, "--patience S", "wait up to so long for an idle machine, s (default 0)", float)
 
 
 class _Version(argparse.Action):
@@ -394,16 +338,13 @@ def _kept(outputs: Any) -> str:
 
     names = complete(outputs)
     verb = "is" if len(names) == 1 else "are"
-    tiles = any(os.path.isdir(os.path.realpath(path) + ".parts") for path in outputs)
-    rest = (
-        "only finished tiles are kept" if tiles else "nothing was written" if not names else "nothing else was written"
-    )
+    rest = "nothing else was written" if names else "nothing was written"
+    if any(os.path.isdir(os.path.realpath(path) + ".parts") for path in outputs):
+        rest = "only finished tiles are kept"
     return f"{' and '.join(names)} {verb} complete, {rest}" if names else rest
 
 
 def _status(exc: Exception) -> int:
-    if any(
-        c.__name__ == "NoDeviceError" for c in type(exc).__mro__
-    ):  # found by name, so that its module need not be loaded
+    if "NoDeviceError" in (kind.__name__ for kind in type(exc).__mro__):  # by name: its module need not be loaded
         return NO_DEVICE
     return BAD_INPUT if isinstance(exc, (ValueError, TypeError, OSError, MemoryError)) else FAILED

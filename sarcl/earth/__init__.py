@@ -16,15 +16,3 @@ For this folder alone:
 
     _grid_index    rows and columns of longitudes and latitudes in a grid
 """
-
-__all__ = [
-    "elevation",
-    "kepler",
-    "light_time",
-    "place",
-    "rotation",
-    "state_vectors",
-    "two_line",
-    "viewing",
-    "zero_doppler",
-]

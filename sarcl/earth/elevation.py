@@ -13,12 +13,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base import validation, wgs84
+from ..base.types import PathLike
 from ..io import elevation
 from ..io.elevation import Geoid
 from ._grid_index import Axes, Curvilinear
-
-if TYPE_CHECKING:
-    from ..base.types import PathLike
 
 FARTHEST = 1e6  # degrees: more is no place
 SAME = 1e-9  # distance to a point, in cells, below which a position is at it
@@ -51,9 +49,7 @@ class ElevationModel:
         if height.ndim != 2 or min(height.shape) < 2:
             raise ValueError(f"height has shape {height.shape}; wanted (n_rows, n_columns), two of each at least")
         if np.isinf(height).any() or np.isnan(height).all():
-            raise ValueError(
-                "height is infinite somewhere, or NaN everywhere; give metres, and NaN where data is missing"
-            )
+            raise ValueError("height is infinite somewhere, or NaN everywhere; give metres, NaN where data is missing")
         if np.nanmax(np.abs(height)) > HIGHEST:
             raise ValueError(f"height reaches {np.nanmax(np.abs(height)):.6g} m, which no land has; give metres")
         for name, axis in (("longitude", 1), ("latitude", 0)):

@@ -53,9 +53,7 @@ class KeplerElements:
         for name, argument in ANGLES.items():
             numbers[name] = validation.number(argument, getattr(self, name))
         if not 0 <= numbers["inclination"] <= np.pi:
-            raise ValueError(
-                f"inclination is {numbers['inclination']:g} rad; it reaches from 0 to pi: was it in degrees?"
-            )
+            raise ValueError(f"inclination is {numbers['inclination']:g} rad, outside 0 to pi: was it in degrees?")
         for name, number in numbers.items():
             object.__setattr__(self, name, number)
         object.__setattr__(self, "with_j2", validation.flag("j2", self.with_j2))

@@ -103,14 +103,10 @@ def _check(number: int, line: object) -> None:
     """ValueError unless `line` is line 1 or 2 of two-line elements, with the right check sum."""
     name = f"line{number}"
     if not isinstance(line, str) or len(line) < 69 or line[:2] != f"{number} ":
-        raise ValueError(
-            f"{name} is {line!r:.90}; wanted the 69 characters of line {number}, which begins with '{number} '"
-        )
+        raise ValueError(f"{name} is {line!r:.90}; wanted the 69 characters of line {number}, from '{number} ' on")
     total = sum(int(c) if c.isdigit() else c == "-" for c in line[:68]) % 10
     if str(total) != line[68]:
-        raise ValueError(
-            f"{name} has check sum {line[68]!r}, but its characters add up to {total}; copy the damaged line again"
-        )
+        raise ValueError(f"{name} has check sum {line[68]!r}, but its characters add up to {total}; copy it again")
 
 
 def _check_fields(line1: str, line2: str) -> None:

@@ -40,9 +40,7 @@ def frequencies(correlation_time: float | None, spectrum: tuple[ArrayLike, Array
     f = validation.array("spectrum frequencies", spectrum[0], np.float64, ("k",))
     density = validation.array("spectrum densities", spectrum[1], np.float64, (len(f),))
     if len(f) < 2 or f[0] < 0 or not (np.diff(f) > 0).all() or (density < 0).any() or not density.any():
-        raise ValueError(
-            "a spectrum is two or more rising frequencies from 0 Hz up, with densities of 0 or more, not all 0"
-        )
+        raise ValueError("a spectrum is rising frequencies from 0 Hz up, with densities of 0 or more, not all 0")
     fine = np.unique(np.concatenate([np.linspace(a, b, 65) for a, b in pairwise(f)]))
     level = np.interp(fine, f, density)
     power = np.concatenate([[0], np.cumsum((level[1:] + level[:-1]) / 2 * np.diff(fine))])

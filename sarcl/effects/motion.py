@@ -218,15 +218,13 @@ def _pulse_of_row(raw: PhaseHistory, track: Trajectory) -> np.ndarray:
     if len(track) == raw.n_rows:
         return np.arange(raw.n_rows)
     if raw.time is None:
-        raise ValueError(
-            f"raw has {raw.n_rows} rows and no times, the track {len(track)} pulses; give one position per row"
-        )
+        raise ValueError(f"raw has {raw.n_rows} rows and no times, the track {len(track)} pulses; give a pulse per row")
     row = np.clip(np.searchsorted(track.known_times, raw.time - 1e-9), 0, len(track) - 1)
     difference = np.abs(track.known_times[row] - raw.time)
     if (difference > 1e-9 * (1 + np.abs(raw.time))).any():
         i = int(np.argmax(difference))
         raise ValueError(
-            f"row {i} was sent at {raw.time[i]:g} s, where the track has no pulse; give one position per row"
+            f"row {i} was sent at {raw.time[i]:g} s, where the track has no pulse; give a position per row"
         )
     return row
 

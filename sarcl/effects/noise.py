@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +16,8 @@ from ..model.image_grid import ImageGrid
 from ..model.lazy_rows import RowsOnDemand
 from ..model.phase_history import PhaseHistory
 from ..model.radar import Radar, noise_variance
-from .noise_level import level_of
+
+LEVELS = ("nesz_db", "nesz", "temperature", "radar", "variance")
 
 MOST_DECIBELS = 300.0  # largest level of noise, dB: amplitudes stay within float32
 STREAM = 0x6E6F697365  # stream of random numbers: independent of those of roughness and speckle with the same seed
@@ -192,3 +194,11 @@ def _unit(vectors: np.ndarray) -> np.ndarray:
     if not length.all():
         raise ValueError(f"an antenna stands on the point at row {int(np.argmin(length))}, where no cell has an area")
     return np.asarray(vectors / length)
+
+
+def level_of(levels: Mapping[str, object]) -> str:
+    """The name of the one level among the arguments of `add_noise`; ValueError where there is none, or several."""
+    names = [name for name in LEVELS if levels.get(name) is not None]
+    if len(names) != 1:
+        raise ValueError(f"noise has one level; give one of {', '.join(LEVELS)}, got {', '.join(names) or 'none'}")
+    return names[0]

@@ -116,9 +116,7 @@ def pulse_motion(raw: PhaseHistory, point: ArrayLike, *, undo: bool = False) -> 
     validation.instance("raw", raw, PhaseHistory)
     undo = validation.flag("undo", undo)
     if raw.waveform is None or raw.waveform.sweep_rate is None:
-        raise ValueError(
-            "raw names no chirp, so its rate is unknown; set raw.waveform to the Waveform.chirp that was sent"
-        )
+        raise ValueError("raw names no chirp, so its rate is unknown; set raw.waveform to the chirp that was sent")
     speeds = raw.tx_velocity, raw.tx_velocity if raw.rx_velocity is None and raw.is_monostatic else raw.rx_velocity
     if speeds[0] is None or speeds[1] is None:
         raise ValueError("raw has no velocities of its antennas; give tracks with velocities, or set raw.tx_velocity")

@@ -9,5 +9,3 @@ For this folder alone:
 
     _demo_scene   the scene of the demo, an airfield
 """
-
-__all__ = ["demo", "fda"]

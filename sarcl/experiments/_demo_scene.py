@@ -137,18 +137,9 @@ def aeroplane() -> list[Trimesh]:
     import trimesh
 
     up = 2.7  # m, height of the fuselage axis
-    profile = [
-        (0, -11),
-        (0.25, -10.6),
-        (0.7, -8.5),
-        (1.2, -5),
-        (1.35, -3),
-        (1.35, 6.5),
-        (1.2, 8.3),
-        (0.8, 9.9),
-        (0, 10.8),
-    ]
-    body = trimesh.creation.revolve(np.array(profile, float), sections=28)
+    radius = [0, 0.25, 0.7, 1.2, 1.35, 1.35, 1.2, 0.8, 0]
+    along = [-11, -10.6, -8.5, -5, -3, 6.5, 8.3, 9.9, 10.8]
+    body = trimesh.creation.revolve(np.column_stack([radius, along]), sections=28)
     body.apply_transform(trimesh.geometry.align_vectors((0, 0, 1), (1, 0, 0)))
     body.apply_translation((0, 0, up))
     parts = [body]
@@ -166,18 +157,8 @@ def aeroplane() -> list[Trimesh]:
         parts += [engine, leg]
     nose = trimesh.creation.box((0.3, 0.3, up - 0.5))
     nose.apply_translation((8.5, 0, (up - 0.5) / 2))
-    fin = hull(
-        [
-            (x, s * t, z)
-            for x, z, t in [
-                (-6.6, up + 1, 0.15),
-                (-10.2, up + 0.6, 0.15),
-                (-9.6, up + 4.6, 0.08),
-                (-11.2, up + 4.6, 0.08),
-            ]
-            for s in (-1, 1)
-        ]
-    )
+    edges = [(-6.6, up + 1, 0.15), (-10.2, up + 0.6, 0.15), (-9.6, up + 4.6, 0.08), (-11.2, up + 4.6, 0.08)]
+    fin = hull([(x, s * thick, z) for x, z, thick in edges for s in (-1, 1)])
     return [*parts, nose, fin]
 
 

@@ -11,5 +11,3 @@ For this folder alone:
 
     _axes      frame, ticks, title and caption of a picture; frames of curves
 """
-
-__all__ = ["cut_plot", "decibels", "html", "plots"]

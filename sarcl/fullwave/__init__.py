@@ -1,6 +1,6 @@
 """Full-wave scattering on a Yee grid (FDTD), and fullwave_echo().
 
-docs/theory/full_wave.md has the equations, the arrays and what each part hands to the next.
+docs/theory/full_wave.md has the equations; docs/developers/full_wave.md has the arrays, and what files hand on.
 
 For other folders:
 
@@ -11,7 +11,6 @@ For other folders:
     currents      one run: the equivalent currents of a target at the frequencies that are asked for
     dispersion    plane waves of the grid: wavenumber, frequency, polarisation, energy flux
     echoes/       fullwave_echo(): echoes of a track from few runs of the grid
-    far_field     echo amplitudes of currents, without the grid's own dispersion
     fields        fields on a device and their time steps, tile by tile
     formed_echoes  waveform forming: echoes of many pulses from the currents of one run
     incident      a plane wave that enters through the faces of a box
@@ -27,21 +26,3 @@ For this folder alone:
     _lists        lists of cells on a device
     _mirrors      targets that a mirror leaves unchanged, and the anchors that then share a run
 """
-
-__all__ = [
-    "absorber",
-    "anchors",
-    "bodies",
-    "current_sums",
-    "currents",
-    "dispersion",
-    "echoes",
-    "far_field",
-    "fields",
-    "formed_echoes",
-    "incident",
-    "lattice",
-    "pulse",
-    "runs",
-    "target",
-]

@@ -4,7 +4,7 @@ At one pulse, the echo that an anchor's currents form is a function of the ancho
 known, for currents that follow the incident wave, and a rest, for paths by other cells. The rest is taken as a random
 function whose correlation over direction is one of FAMILIES of one rate. Family and rate are those under which each
 anchor, predicted from the others, is most likely.
-Source: O. Dubrule, Math. Geology 15 (1983), for predictions that leave one anchor out; docs/theory/full_wave.md.
+Source: O. Dubrule, Math. Geology 15 (1983), for predictions that leave one anchor out; docs/theory/waveform_forming.md.
 """
 
 from __future__ import annotations

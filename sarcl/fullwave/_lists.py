@@ -19,7 +19,7 @@ class TargetList:
     """Places of a field with their coefficients and old values, and samples of the residuals.
 
     places    as in Lattice, in the order of GroupOrder (n,);  count  n rounded up to whole vectors, at least one
-    conducts  edges of a conductor alone, which have no coefficients
+    conducts  edges of a conductor alone, which have no coefficients;  rows  buffer of the first entry of each group
     """
 
     def __init__(self, device: Device, lattice: Lattice, at: np.ndarray, values: np.ndarray) -> None:
@@ -34,7 +34,7 @@ class TargetList:
             padded[:, : len(at)] = values[:, sort.order]
         in_buffer = np.zeros(self.count, np.int32)
         in_buffer[: len(at)] = lattice.in_buffer(self.places)
-        self._rows = device.copied(sort.first)
+        self.rows = device.copied(sort.first)
         self._at, self._values = device.copied(in_buffer), device.copied(padded)
         self._old, self.residual = device.zeros(4 * max(kept, 1)), device.zeros(4 * self.count * SAMPLES)
 
@@ -46,11 +46,6 @@ class TargetList:
     def numbers(self, sample: int | None) -> dict[str, int]:
         """Numbers of kernels: count, and where sample number `sample` of the residuals is stored."""
         return {"count": self.count, "record": -1 if sample is None else sample * self.count}
-
-    @property
-    def rows(self) -> Any:
-        """The buffer of the first entry of each group of rows."""
-        return self._rows
 
     def span(self, planes: tuple[int, int]) -> tuple[int, int]:
         """First entry of a range of planes, and the first one after these."""

@@ -49,7 +49,7 @@ class Anchored:
 
 def anchored(
     formed: Callable[[int], np.ndarray], along: np.ndarray, *, anchors: str | int | np.ndarray = "auto",
-    tolerance: float = 3e-2, mirror: np.ndarray | None = None, progress: Callable[[str, int, int], None] | None = None,
+    tolerance: float = 3e-2, mirror: np.ndarray | None = None,
 ) -> Anchored:  # fmt: skip
     """Echoes of P pulses to a tolerance.
 
@@ -58,14 +58,12 @@ def anchored(
     anchors    "auto": as many as the tolerance needs; a number of anchors, equispaced; or the numbers of their pulses
     tolerance  relative error of the echoes, as Anchored.predicted_error
     mirror     for each pulse the number of the pulse whose anchor the same run serves by symmetry, or -1 (P,)
-    progress   progress("anchors", done, total), total a lower limit where anchors are "auto"
     """
-    work = _Work(formed, np.asarray(along, float), mirror, progress)
+    work = _Work(formed, np.asarray(along, float), mirror)
     if not isinstance(anchors, str):
-        asked = np.atleast_1d(anchors) if np.ndim(anchors) else _equispaced(work.along, int(anchors))
-        work.run(asked, len(asked))
+        work.run(np.atleast_1d(anchors) if np.ndim(anchors) else _equispaced(work.along, int(anchors)))
         return work.result()
-    work.run(_nearest(work.along, np.array(FIRST)), LEAST)
+    work.run(_nearest(work.along, np.array(FIRST)))
     while work.model is not None and work.worst is not None:
         n = len(work.got)
         if n >= LEAST and work.predicted_error <= tolerance * (ENOUGH if n > LEAST else ENOUGH_OF_FEW):
@@ -77,24 +75,19 @@ def anchored(
 class _Work:
     """Anchors that have been run, and the echoes from them."""
 
-    def __init__(
-        self, formed: Callable[[int], np.ndarray], along: np.ndarray, mirror: np.ndarray | None,
-        progress: Callable[[str, int, int], None] | None,
-    ) -> None:  # fmt: skip
-        self._formed, self._mirror, self._progress = formed, mirror, progress
+    def __init__(self, formed: Callable[[int], np.ndarray], along: np.ndarray, mirror: np.ndarray | None) -> None:
+        self._formed, self._mirror = formed, mirror
         self.along = along if along[-1] >= along[0] else -along
         self.got: dict[int, np.ndarray] = {}
         self.history: list[tuple[int, float]] = []
         self.checks: list[Check] = []
 
-    def run(self, pulses: np.ndarray, total: int) -> None:
+    def run(self, pulses: np.ndarray) -> None:
         """Run anchors, and what a mirror gives with them, and interpolate; one anchor serves each direction."""
         for pulse in pulses:
             for number in (int(pulse), *self._twin(int(pulse))):
                 if not self._served[number]:
                     self.got[number] = self._formed(number)
-            if self._progress:
-                self._progress("anchors", len(self.got), max(total, len(self.got)))
         self.pulses = np.array(sorted(self.got))
         several = len(self.pulses) > 1
         every = np.stack([self.got[int(pulse)] for pulse in self.pulses])
@@ -140,7 +133,7 @@ class _Work:
         reach = NEAR * np.abs(self.along[self.pulses] - self.along[pulse]).min()
         near = np.abs(self.along - self.along[pulse]) <= reach
         guess = sum(w * self.got[int(a)][near] for a, w in zip(self.pulses, weights, strict=True))
-        self.run(np.array([pulse]), len(self.got) + 1)
+        self.run(np.array([pulse]))
         own = self.got[pulse][near]
         energy = (np.abs(own) ** 2).sum()
         found = np.sqrt((np.abs(guess - own) ** 2).sum() / energy)

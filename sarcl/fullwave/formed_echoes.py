@@ -6,9 +6,9 @@
 The current of a cell follows the incident wave, whose direction of travel was d: its phase is corrected by the
 difference of the paths from the transmitter T of this pulse, and the field at the receiver R of this pulse is that of
 these currents. k is the wavenumber that was asked for; at the frequency at which the grid's wave from T has it, the
-grid's wave towards R has k_r, and g, g_r, e_r, h_r as in far_field. In the direction of the run itself this is
-`far_field.amplitude`. Source: B. Zou, Y. Jia and Z. Qiao, Proc. SPIE 11742 (2021), equations (4) to (6);
-docs/theory/full_wave.md.
+grid's wave towards R has the wavenumber k_r and the fields e_r and h_r; g and g_r are the energy fluxes of the incident
+wave and of that wave, and s = c dt/dx. Source: B. Zou, Y. Jia and Z. Qiao, Proc. SPIE 11742 (2021), equations (4) to
+(6); docs/theory/waveform_forming.md.
 """
 
 from __future__ import annotations

@@ -5,7 +5,6 @@ For other folders:
     antenna_beam     an antenna as the beam of an image: the matched filter of its pattern
     backproject      backproject(): an image to a stated tolerance
     choose_method    the cheapest method that meets the tolerance
-    collection       what an image keeps of the data that it was made from
     compress         compress(): pulse compression
     default_grid     a grid for data that come without one
     engine           what every method offers: a plan, and an engine that makes bands on one device
@@ -28,30 +27,4 @@ For other folders:
 For this folder alone:
 
     _row_coverage    which rows saw a pixel, and the sum of their weights: the gain of the image
-    _rows_in_phase   errors of interpolation that add up in phase over a few rows
 """
-
-__all__ = [
-    "antenna_beam",
-    "backproject",
-    "backproject_options",
-    "choose_method",
-    "collection",
-    "compress",
-    "default_grid",
-    "direct",
-    "engine",
-    "factorized",
-    "float64",
-    "focus_options",
-    "focusing_task",
-    "forecast",
-    "pixel_taper",
-    "polar_format",
-    "profile_energy",
-    "range_doppler",
-    "run",
-    "strip_map",
-    "tiling",
-    "unseen_pixels",
-]

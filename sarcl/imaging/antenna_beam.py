@@ -24,12 +24,11 @@ from ..model.antenna import Antenna, pair_of
 from ..model.phase_history import PhaseHistory
 from ..model.trajectory import Trajectory
 from ..numerics.pulse_geometry import PulseGeometry
-from ..opencl.device import Device
+from ..opencl.device import Buffer, Device
 from ..scattering.antenna_weight_error import ANGLE, PATTERN
 from ..scattering.antenna_weights import AntennaWeights
 
 if TYPE_CHECKING:
-    from ..opencl.device import Buffer
     from .focusing_task import FocusingTask
 
 AntennaBeam: TypeAlias = Antenna | tuple[Antenna, ArrayLike | Trajectory]  # and its direction or attitude

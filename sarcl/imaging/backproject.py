@@ -25,8 +25,8 @@ from ._row_coverage import room_for_gain, seen_by
 from .antenna_beam import shares
 from .backproject_options import BackprojectOptions
 from .choose_method import MethodChoice, choose
-from .collection import collection
 from .engine import Skipped
+from .focus_options import collection, relative_error
 from .focusing_task import FocusingTask
 from .forecast import forecast_of, speed
 from .pixel_taper import PixelTaper
@@ -187,9 +187,10 @@ class BackprojectPlan:
             where, remedy = ("range window", "") if skipped.beam == 0 else ("range window and beam", " and the beam")
             log.warning(NOTHING_SEEN, where, remedy)
         unseen = unseen_pixels(task)
-        if unseen and unseen.warning and done:
-            warn(unseen.warning)
-        measured = self._measured(output.data, clock)
+        if unseen and unseen.warning() and done:
+            warn(unseen.warning())
+        pairs, seconds = CHECKED * task.raw.n_rows * self.raw.n_samples, clock.seconds.get("backproject", 0.0)
+        measured = self.options.measured(pairs, seconds, clock, lambda: _measure_error(task, grid, output.data))
         gain = self._gain(done)
         clock.lap("gain")
         plan = self.chosen.plan.describe(self.chosen.method)
@@ -215,15 +216,6 @@ class BackprojectPlan:
         )
         frequency = float(np.median(task.antennas.frequency))
         return {**gain, "frequency": frequency, "report": report, **collection(task.raw, grid, self.options.window)}
-
-    def _measured(self, data: Any, clock: Clock) -> float | None:
-        """The error at random pixels, where that is asked for or cheap."""
-        pairs = CHECKED * self.task.raw.n_rows * self.raw.n_samples
-        if not self.options.is_checked(pairs, clock.seconds.get("backproject", 0.0)):
-            return None
-        measured = _measure_error(self.task, self.grid, data)
-        clock.lap("check")
-        return measured
 
     def _gain(self, done: int) -> dict[str, Any]:
         """The gain of the image, as fields of Image."""
@@ -298,5 +290,4 @@ def _measure_error(task: FocusingTask, grid: ImageGrid, data: Any) -> float:  # 
         else np.array([data[i] for i in zip(*index, strict=True)])
     )
     clear = np.isfinite(truth)
-    wrong, scale = float(np.linalg.norm((got - truth)[clear])), max(float(np.linalg.norm(truth[clear])), spread)
-    return wrong / scale if wrong else 0.0
+    return relative_error(got[clear], truth[clear], spread)

@@ -18,7 +18,6 @@ from ..numerics import cost_model
 from ..numerics.cost_model import DeviceClass
 from ..opencl import native_functions
 from ..opencl.device import Device, DeviceChoice
-from ..opencl.memory_budget import budget
 from .choose_method import METHODS, MethodChoice, choose
 from .focus_options import GridOptions
 from .focusing_task import BeamCone, FocusingTask, Skip, make_task
@@ -93,9 +92,7 @@ class BackprojectOptions(GridOptions):
         instance("grid", grid, ImageGrid)
         if self.mapping is not None:
             if isinstance(self.mapping, dict) and "mapping" not in self.mapping:
-                raise ValueError(
-                    f"mapping is {self.mapping!r:.60}; a dict names the kind too: {{'mapping': 'apparent'}}"
-                )
+                raise ValueError(f"mapping is {self.mapping!r:.60}; a dict needs the kind: {{'mapping': 'apparent'}}")
             raw = map_aperture(raw, **(self.mapping if isinstance(self.mapping, dict) else {"mapping": self.mapping}))
         return raw, make_task(
             raw, grid, self.window, self.weights, self.wrap, self.skip, self.beam, self.sum_polarizations
@@ -118,7 +115,3 @@ class BackprojectOptions(GridOptions):
             except MemoryError:
                 return choose(task, "direct", tolerance, on, float64)
         return chosen
-
-    def budget(self, device: Device) -> float:
-        """Bytes that blocks may take on a device."""
-        return min(budget(device, self.max_bytes), device.info.memory)

@@ -11,7 +11,6 @@ import numpy as np
 from ..base.errors import ToleranceUnreachable
 from ..base.report import ErrorTerm, terms_of_sum
 from ..base.tolerances import askable, reachable, rounded_up
-from ..base.validation import LARGEST_TOLERANCE
 from ..numerics import cost_model, error_bounds
 from ..numerics import plan as numerics_plan
 from ..numerics.cost_model import CPU, DeviceClass
@@ -33,6 +32,7 @@ from .tiling.tiling import Tiling
 
 METHODS = ("auto", "direct", "factorized")
 ROUNDING = 0.5  # largest share of a tolerance for each error that no plan makes smaller; the plan needs the rest
+STEP_OF_SEARCH = 2.0  # ratio of the tolerances that are tried for a refusal: plans of sub-apertures take long
 GAINS, SUMS = "float32 gains of the antenna", "rounding of float32 sums"
 COORDINATES, NEAR_ORIGIN = "float64 coordinates of a plane's pixels", "put the origin near the scene"
 
@@ -255,7 +255,8 @@ def _factorized(task: FocusingTask, tolerance: float, devices: DeviceClass, floa
     if isinstance(candidate, MethodChoice):
         return candidate
     direct = _direct(task, tolerance, devices, float64)
-    best = _search(lambda t: _confirmed(_Float32(task, t).factorized(devices)), max(tolerance, LEAST_TOLERANCE))
+    least = max(tolerance, LEAST_TOLERANCE)
+    best = reachable(lambda t: _confirmed(_Float32(task, t).factorized(devices)), least, STEP_OF_SEARCH)
     if isinstance(direct, MethodChoice):
         remedy = "method='direct' can"
     elif best is None:
@@ -263,28 +264,6 @@ def _factorized(task: FocusingTask, tolerance: float, devices: DeviceClass, floa
     else:
         remedy = ""
     return candidate.restated(tolerance, best, remedy)
-
-
-def _search(plan: Callable[[float], object], above: float) -> float | None:
-    """A tolerance of `above` or more that `plan` meets, at most 1.5 times the smallest one; None: none that is allowed.
-
-    Plans take long, so few are tried: each at twice the tolerance before, then one halfway back.
-    """
-
-    def is_met(tolerance: float) -> bool:
-        try:
-            plan(tolerance)
-        except ToleranceUnreachable:
-            return False
-        return True
-
-    failed, best = 0.0, rounded_up(above)
-    while not is_met(best):
-        if best >= LARGEST_TOLERANCE:
-            return None
-        failed, best = best, min(rounded_up(2 * best), LARGEST_TOLERANCE)
-    middle = rounded_up(float(np.sqrt(best * failed))) if failed else best
-    return middle if middle < best and is_met(middle) else best
 
 
 def _float64(task: FocusingTask, tolerance: float) -> Candidate:

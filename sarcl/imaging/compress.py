@@ -45,10 +45,10 @@ def compress(raw: PhaseHistory, waveform: Waveform | None = None) -> PhaseHistor
     return compressed
 
 
-def _check_contrast(made: PhaseHistory, raw: PhaseHistory, pulse: Waveform) -> None:
+def _check_contrast(compressed: PhaseHistory, raw: PhaseHistory, pulse: Waveform) -> None:
     """Warn where compression has spread the echoes: by a wrong chirp they become longer, not shorter."""
     rows = spread_over(raw.n_rows, SOME_ROWS)
-    level = _contrast([made.read(p, p + 1)[0] for p in rows])
+    level = _contrast([compressed.read(p, p + 1)[0] for p in rows])
     # the contrast of n samples of noise is 2, with a standard deviation of 2/sqrt(n)
     doubt = 10 / np.sqrt(len(rows) * raw.n_samples)
     other = 0.0

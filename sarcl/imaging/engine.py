@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -13,13 +12,10 @@ from ..base.stage_timer import Clock
 from ..numerics import cost_model, device_profiles, range_profiles
 from ..numerics.device_profiles import DeviceProfiles
 from ..numerics.interpolation import Interpolator
-from ..opencl.device import Device
+from ..opencl.device import Buffer, Device
 from ..opencl.pipeline import Pipeline
 from .focusing_task import FocusingTask
 from .tiling.tiling import FlatImage, Run, Tiling
-
-if TYPE_CHECKING:
-    from ..opencl.device import Buffer
 
 
 @dataclass(frozen=True)
@@ -65,7 +61,7 @@ class ImagePlan(Protocol):
         ...
 
 
-class Engine(ABC):
+class Engine(Protocol):
     """A method of focusing, on one device, for one task and plan.
 
     tiling        tiling whose bands are the units of work; fixed by grid, geometry and tolerance
@@ -78,26 +74,21 @@ class Engine(ABC):
     dtype: type[np.complexfloating]
     least_pixels: float
 
-    @abstractmethod
     def __init__(self, device: Device, task: FocusingTask, plan: Any, tiling: Tiling) -> None: ...
 
-    @abstractmethod
     def blocks(self, nbytes: float) -> list[Run]:
         """Runs (first, last) of bands that together are all, each to be filled with nbytes on the device.
 
         MemoryError where nbytes is too little for anything.
         """
 
-    @abstractmethod
     def working(self, nbytes: float) -> float:
         """Estimated bytes on the device that `fill` takes for the first block when it is given nbytes."""
 
-    @abstractmethod
     def repeated(self, nbytes: float) -> float:
         """Cost, in contributions of numerics/cost_model, of what `fill` makes more than once because nbytes on the
         device divide the image: range profiles, and what precedes the division."""
 
-    @abstractmethod
     def fill(
         self, first: int, last: int, flat: FlatImage, budget: float, clock: Clock, on_progress: Callable[[float], None]
     ) -> Skipped:
@@ -109,12 +100,11 @@ class Engine(ABC):
         """
 
 
-class DirectEngine(Engine):
+class DirectEngine(Engine, Protocol):
     """An engine of a direct method, in either number type: its blocks hold as many tiles as fit."""
 
     profiles: RowProfiles
 
-    @abstractmethod
     def tiles_at_once(self, nbytes: float) -> int:
         """Tiles that fit in nbytes on the device beside the range profiles; MemoryError where those do not fit."""
 

@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base import arguments
+from ..base import arguments, wgs84
 from ..base.errors import confirm_tolerance
 from ..base.options import option
+from ..base.stage_timer import Clock
 from ..base.types import PathLike
 from ..io import formats, output_paths
 from ..model import store
 from ..model.image import Image
+from ..model.image_grid import ImageGrid
+from ..model.phase_history import PhaseHistory
 from ..numerics.run_options import RunOptions
-from ..numerics.windows import Window
+from ..numerics.windows import Window, in_words
+from ..opencl.device import Device
+from ..opencl.memory_budget import budget
 
 EXACT_PAIR = 3e-8  # s, of the exact sum, per sample and pixel
 CHEAP_CHECK = 0.02  # share of the time of the image: a check that costs less is made by default
@@ -36,10 +44,33 @@ class FocusOptions(RunOptions):
         None, 'None, or a path ending in ".h5": the image is written there when it is finished', in_files=False
     )
 
-    def is_checked(self, pairs: float, seconds: float) -> bool:
-        """Whether the exact sum of so many pairs of sample and pixel is asked for, or cheap beside the seconds of the
-        image."""
-        return pairs * EXACT_PAIR < CHEAP_CHECK * seconds if self.check is None else self.check
+    def budget(self, device: Device) -> float:
+        """Bytes that blocks may take on a device."""
+        return min(budget(device, self.max_bytes), device.info.memory)
+
+    def measured(self, pairs: float, seconds: float, clock: Clock, error: Callable[[], float]) -> float | None:
+        """The error of some pixels, where the exact sum of so many pairs of sample and pixel is asked for, or cheap
+        beside the seconds of the image; else None."""
+        if not (pairs * EXACT_PAIR < CHEAP_CHECK * seconds if self.check is None else self.check):
+            return None
+        value = error()
+        clock.lap("check")
+        return value
+
+    def shares_of(self, stage: str) -> Callable[[float], None]:
+        """The function that reports the share of a stage that is done."""
+
+        def on_progress(share: float) -> None:
+            if self.progress:
+                self.progress(stage, round(1000 * share), 1000)
+
+        return on_progress
+
+
+def relative_error(pixels: np.ndarray, exact: np.ndarray, random: float) -> float:
+    """Error of pixels against exact ones, relative to the larger of their norm and that of random phases."""
+    wrong = float(np.linalg.norm(pixels - exact))
+    return wrong / max(float(np.linalg.norm(exact)), random) if wrong else 0.0
 
 
 def check_output(out: PathLike | None) -> None:
@@ -68,3 +99,23 @@ class GridOptions(FocusOptions):
     sum_polarizations: bool = option(
         False, "True: rows of several polarisations are summed coherently; False: they are refused"
     )
+
+
+def collection(raw: PhaseHistory, grid: ImageGrid, window: Window | None) -> dict[str, Any]:
+    """Fields of the Image that echoes are focused to, but data, grid, gain, frequency and report."""
+    middle = raw.n_rows // 2
+    half = raw.frequency_step / 2
+    kinds = [] if raw.polarization is None else sorted(set(raw.polarization.tolist()))
+    speeds = {n: getattr(raw, n) for n in ("tx_velocity", "rx_velocity")}
+    if raw.is_monostatic and speeds["rx_velocity"] is None:
+        speeds["rx_velocity"] = speeds["tx_velocity"]
+    return {
+        "tx": raw.tx[middle],
+        "rx": raw.rx[middle],
+        **{name: None if speed is None else speed[middle] for name, speed in speeds.items()},
+        "time": None if raw.time is None else (raw.time.min(), raw.time.max()),
+        "band": ((raw.frequency - half).min(), (raw.frequency + (raw.n_samples - 1) * raw.frequency_step + half).max()),
+        "window": in_words(window),
+        "polarization": "+".join(kinds) or None,
+        "frame": "local" if wgs84.vertical_at(grid.bounds.mean(axis=0)) is None else "earth-fixed",
+    }

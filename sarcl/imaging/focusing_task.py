@@ -20,6 +20,7 @@ from ..model.trajectory import Trajectory
 from ..numerics import windows
 from ..numerics.plan import skips as known_skips
 from ..numerics.pulse_geometry import UNLIMITED, PulseGeometry
+from ..numerics.range_profiles import LARGEST
 from ..numerics.windows import Window
 from ..scattering.antenna_weights import AntennaWeights
 from .antenna_beam import antenna_of, is_antenna, picked
@@ -250,6 +251,23 @@ def weigh(raw: PhaseHistory, window: Window | None, weights: ArrayLike | None) -
     if not rows.any():
         raise ValueError("every row has weight 0; nothing would be focused")
     return windows.weights(across, raw.n_samples), rows
+
+
+def weighted_rows(
+    raw: PhaseHistory, weights: tuple[np.ndarray, np.ndarray], start: int, stop: int
+) -> tuple[np.ndarray, float]:
+    """Rows start ... stop - 1 times weights of samples (n_samples,) and rows (n_rows,); and their largest modulus.
+
+    ValueError where sums of all samples may exceed complex64.
+    """
+    samples = raw.read(start, stop) * np.outer(weights[1][start:stop], weights[0]).astype(np.float32)
+    largest, n_samples = float(np.abs(samples).max(initial=0.0)), raw.n_rows * raw.n_samples
+    if largest > LARGEST[np.complex64] / n_samples:
+        raise ValueError(
+            f"samples times weights reach {largest:.1e}; sums of {n_samples} in complex64 hold up to "
+            f"{LARGEST[np.complex64]:.0e}: scale the samples down"
+        )
+    return samples, largest
 
 
 def geometry_of(

@@ -46,8 +46,8 @@ def forecast_of(
     unseen = unseen_pixels(task)
     if unseen:
         details["pixels outside every range window"] = unseen.describe()
-        if unseen.warning:
-            warn(unseen.warning)
+        if unseen.warning():
+            warn(unseen.warning())
     cheaper = _cheaper(task, options, devices, chosen, seconds, besides)
     return Forecast(
         method=chosen.method,

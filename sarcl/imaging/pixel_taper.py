@@ -10,16 +10,12 @@ Kernels: kernels/pixel_weights.clh.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..opencl.device import Device
+from ..opencl.device import Buffer, Device
 from ._row_coverage import RowCoverage
 from .focusing_task import FocusingTask
-
-if TYPE_CHECKING:
-    from ..opencl.device import Buffer
 
 CELLS = 2**14  # cells of a table in float32
 WEIGHT_BUFFERS = 3  # of weights, among a kernel's arguments: any others stand in their places where there are none

@@ -39,13 +39,11 @@ class UnseenPixels:
         """For a report."""
         return f"{self.count} of {self.tried} tried, {self.share:.1%}"
 
-    @property
-    def warning(self) -> str:
-        """Share, cause and cure, in words; empty where so few are unseen that nothing need be said."""
-        return self.warned()
+    def warning(self, wraps: bool = True) -> str:
+        """Share, cause and cure, in words; empty where so few are unseen that nothing need be said.
 
-    def warned(self, wraps: bool = True) -> str:
-        """The same; wraps: False for functions that have no argument `wrap`."""
+        wraps  False for functions that have no argument `wrap`
+        """
         if self.share < WORTH_SAYING:
             return ""
         (near, far), (low, high) = self.ranges, self.window

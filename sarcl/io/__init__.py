@@ -20,7 +20,7 @@ For this folder alone:
     _collada_checks  surfaces of COLLADA files that would be left out or covered wrongly in silence: refused
     _gltf_checks   surfaces of glTF files that would be left out in silence: refused
     _gotcha        AFRL Gotcha volumetric SAR data set, MATLAB 5
-    _hdf5_safety   HDF5 files that lead into others, declare too much or never end: refused
+    _hdf5_safety   HDF5 files that lead into others: refused
     _mat5_checks   the structure of a MATLAB 5 file, walked before scipy reads it
     _mesh_archive  meshes in archives
     _mesh_checks   faces that a mesh file declares and holds; polygons and the fans that cover them
@@ -31,16 +31,3 @@ For this folder alone:
     _partial_hdf5  an HDF5 file that appears at its path only when it is complete
     _ply           PLY files: vertices and polygons, each number of the type that its header declares
 """
-
-__all__ = [
-    "elevation",
-    "formats",
-    "hdf5",
-    "input_paths",
-    "mesh",
-    "orbit_files",
-    "output_paths",
-    "sarcl_hdf5",
-    "toml",
-    "xml",
-]

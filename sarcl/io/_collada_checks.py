@@ -35,7 +35,7 @@ def check(document: collada.Collada, what: str) -> None:
     tag, root = document.tag, document.xmlnode.getroot()
     if next(root.iter(tag("instance_controller")), None) is not None:
         raise ValueError(
-            f"{what} has skins or morphed shapes (controllers), which are not read here; apply them, then {AGAIN}"
+            f"{what} has skins or morphed shapes (controllers), which are not read; apply them, then {AGAIN}"
         )
     if next(root.iter(tag("ph")), None) is not None:
         raise ValueError(f"{what} has polygons with holes, which are not read here; export it as triangles")

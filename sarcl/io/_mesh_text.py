@@ -62,9 +62,7 @@ def _corner(word: str, counts: dict[str, int], where: str) -> list[int | None]:
         try:
             index = int(digits)
         except ValueError:
-            raise ValueError(
-                f"{where}: {word!r:.40} is no corner of a face, wanted v, v/vt, v//vn or v/vt/vn"
-            ) from None
+            raise ValueError(f"{where}: {word!r:.40} is no corner; wanted v, v/vt, v//vn or v/vt/vn") from None
         absolute = counts[name] + 1 + index if index < 0 else index
         if absolute < 1:
             raise ValueError(

@@ -12,10 +12,8 @@ import stat
 import time
 import zlib
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from ..base.types import PathLike
+from ..base.types import PathLike
 
 log = logging.getLogger(__name__)
 

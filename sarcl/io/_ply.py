@@ -1,6 +1,7 @@
 """PLY files (G. Turk, 1994), text and binary: vertices and polygons, each number of the type that its header declares.
 
-trimesh takes the length of the first list for that of all, and lets numbers of text wrap around their declared type.
+trimesh takes the length of the first list for that of all, and lets numbers of text wrap around their declared type:
+here numbers of text are what is written.
 """
 
 from __future__ import annotations
@@ -52,7 +53,7 @@ class _Element:
 def read(data: bytes, what: str) -> tuple[np.ndarray, np.ndarray]:
     """Vertices (n, 3) and triangles (k, 3) of a PLY file, polygons as fans about their first corners.
 
-    ValueError: a damaged file, numbers beyond their declared types, polygons that fans do not cover.
+    ValueError: a damaged file, polygons that fans do not cover.
     """
     head = HEADER.match(data)
     if head is None:
@@ -67,9 +68,7 @@ def read(data: bytes, what: str) -> tuple[np.ndarray, np.ndarray]:
     elements_by_name = {element.name: element for element in elements if element.rows}
     for name in elements_by_name:
         if name.startswith("tristrip"):
-            raise ValueError(
-                f"{what} has strips of triangles ({name}), which are not read here; export it as triangles"
-            )
+            raise ValueError(f"{what} has strips of triangles ({name}), which are not read; export triangles")
     if "vertex" not in elements_by_name or "face" not in elements_by_name:
         return np.zeros((0, 3)), np.zeros((0, 3), np.int64)
     vertices = _vertices(elements_by_name["vertex"], body, what)
@@ -244,9 +243,7 @@ def _vertices(element: _Element, body: _Text | _Binary, what: str) -> np.ndarray
         raise ValueError(
             f"{what} has vertices of {', '.join(types) or 'nothing'}, wanted x, y and z: {_mesh_checks.TAKE}"
         )
-    coordinates = [
-        _whole_numbers(body.take(element.start[name], types[name]), types[name], name, what) for name in "xyz"
-    ]
+    coordinates = [body.take(element.start[name], types[name]) for name in "xyz"]
     return np.stack(coordinates, axis=1).astype(np.float64)
 
 
@@ -263,29 +260,14 @@ def _triangles(element: _Element, body: _Text | _Binary, vertices: np.ndarray, w
     within = np.arange(int(corners.sum())) - np.repeat(begin, corners)
     index = body.take(np.repeat(element.start[p.name], corners) + within * body.width(p.type), p.type)
     owner = np.repeat(np.arange(element.rows), corners)
-    is_wrong = ~((index >= 0) & (index < len(vertices)))
+    is_wrong = ~((index >= 0) & (index < len(vertices)) & (index == np.rint(index)))
     if is_wrong.any():
         face = int(np.argmax(is_wrong))
         raise ValueError(
             f"{what}: face {owner[face]} names vertex {index[face]:.20g} of {len(vertices)}: {_mesh_checks.TAKE}"
         )
-    index = _whole_numbers(index, p.type, p.name, what).astype(np.int64)
+    index = index.astype(np.int64)
     wrong_faces = _mesh_checks.wrong_fans(corners, index, vertices)
     if wrong_faces:
         raise ValueError(f"{what}: face {wrong_faces[0]}, of {corners[wrong_faces[0]]} corners, {_mesh_checks.CONCAVE}")
     return _mesh_checks.fans(corners, index)
-
-
-def _whole_numbers(given: np.ndarray, type_: np.dtype, name: str, what: str) -> np.ndarray:
-    """`given`; ValueError for numbers of text that do not fit the whole-number type that is declared for them."""
-    if type_.kind == "f" and name in "xyz":
-        return given
-    low, high = (np.iinfo(type_).min, np.iinfo(type_).max) if type_.kind in "iu" else (-np.inf, np.inf)
-    wrong = ~((given >= low) & (given <= high))
-    wrong[~wrong] = given[~wrong] != np.rint(given[~wrong])
-    if wrong.any():
-        raise ValueError(
-            f"{what}: {name} {given[np.argmax(wrong)]:.10g} does not fit its type, whole numbers from {low:.10g} to "
-            f"{high:.10g}, which the header declares: {_mesh_checks.TAKE}"
-        )
-    return given

@@ -64,9 +64,7 @@ def load(mesh: object, repair: bool = True, external: bool = False) -> Mesh:
         raise TypeError(f"{what} is a {type(mesh).__name__}; give a file name or a trimesh.Trimesh")
     vertices, faces, part, names = _parts(mesh, what)
     if len(faces) == 0:
-        raise ValueError(
-            f"{what} has no faces; nothing would reflect: check what the file holds and how it was exported"
-        )
+        raise ValueError(f"{what} has no faces; nothing would reflect: check what the file holds")
     validation.finite(f"{what} vertices", vertices)
     kept, turned, closed = _mesh_repair.repaired(vertices, faces, repair, what)
     faces = np.where(turned[:, None], faces[:, ::-1], faces)[kept]

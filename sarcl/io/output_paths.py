@@ -30,9 +30,7 @@ def check_writable(path: PathLike, n_bytes: int = 0) -> Path:
     target = place(path)
     folder, shown = target.parent, str(path)
     if not os.path.lexists(folder):
-        raise FileNotFoundError(
-            f"cannot write {shown!r}: there is no folder {str(folder)!r}; create it or choose another"
-        )
+        raise FileNotFoundError(f"cannot write {shown!r}: there is no folder {str(folder)!r}; create it")
     if not folder.is_dir():
         raise NotADirectoryError(f"cannot write {shown!r}: {str(folder)!r} is a file, not a folder; choose another")
     try:

@@ -56,18 +56,15 @@ def load(path: PathLike, make: Make[T], autofocus: bool = False, external: bool 
             raise ValueError(f"{name!r} has format {version}, this sarcl reads format {hdf5.FORMAT}; update sarcl")
         kind, rows = ROWS[mark]
         try:
-            _hdf5_safety.check_contents(file, Path(path).stat().st_size, external)
-            dataset = file[rows]
-            if sums is not None and sums.rows is not None:
-                dataset = _with_checksums(dataset, sums)
+            if not external:
+                _hdf5_safety.check_links(file)
+            dataset = _with_checksums(file[rows], sums)
             fields = {**hdf5.get_all(file, leave=("report", rows)), rows: dataset, "report": hdf5.get_report(file)}
             return make(kind, fields)
         except _hdf5_safety.Refused as exc:
             raise ValueError(f"{name!r} {exc}") from None
         except MemoryError as exc:
-            raise MemoryError(
-                f"{name!r} holds arrays for which there is no memory ({exc}); read it elsewhere"
-            ) from None
+            raise MemoryError(f"{name!r} holds arrays too large for memory ({exc}); read it elsewhere") from None
         except Exception as exc:  # h5py, json and the objects that are made fail in many ways on a damaged file
             raise ValueError(f"{name!r} is damaged: it holds no whole {kind} ({exc}); save or copy it again") from exc
     except BaseException:
@@ -81,25 +78,17 @@ def open_rows(path: PathLike, name: str) -> h5py.Dataset:
     ValueError where the file is damaged, OSError or KeyError where there is no such file or dataset.
     """
     sums = _verify_checksums(path)
-    dataset = _open_file(path)[name]
-    return (
-        dataset
-        if sums is None or sums.rows is None or sums.rows[0] != name.strip("/")
-        else _with_checksums(dataset, sums)
-    )
+    return _with_checksums(_open_file(path)[name], sums)
 
 
 def _verify_checksums(path: PathLike) -> _checksums.Checksums | None:
-    """Checksums of a file after a check of all but its rows; one without checksums is tried in another process."""
+    """Checksums of a file after a check of all but its rows; None where it has none."""
     try:
-        sums = _checksums.of(Path(path))
-        if sums is None:
-            _hdf5_safety.check_readable(path)
+        return _checksums.of(Path(path))
     except _checksums.Truncated as exc:
         raise ValueError(f"{str(path)!r} is truncated or damaged: {exc}; copy it again") from None
-    except (_checksums.Damaged, _hdf5_safety.Refused) as exc:
+    except _checksums.Damaged as exc:
         raise ValueError(f"{str(path)!r} is damaged: {exc}; save or copy it again") from None
-    return sums
 
 
 def _open_file(path: PathLike) -> h5py.File:
@@ -112,10 +101,12 @@ def _open_file(path: PathLike) -> h5py.File:
         raise ValueError(f"{str(path)!r} is {what} ({exc}); copy it again or give a file saved by sarcl") from None
 
 
-def _with_checksums(dataset: h5py.Dataset, sums: _checksums.Checksums) -> h5py.Dataset:
+def _with_checksums(dataset: h5py.Dataset, sums: _checksums.Checksums | None) -> h5py.Dataset:
+    """The dataset, with the checksums that a file has for it."""
     from ._checked_rows import CheckedRows
 
-    return CheckedRows(dataset, sums)
+    has_sums = sums is not None and sums.rows is not None and sums.rows[0] == dataset.name.strip("/")
+    return CheckedRows(dataset, sums) if sums is not None and has_sums else dataset
 
 
 def job_of(path: PathLike) -> str | None:

@@ -23,27 +23,9 @@ For other folders:
 For this folder alone:
 
     _costas           Costas permutations by the constructions of Welch and Golomb
+    _grid_checks      checks of what an image grid is made of
     _orbit_arguments  arguments of Orbit: positions, spans of time
-    _orbit_attitude   attitudes of antennas in orbit, and directions around a beam
+    _row_fields       fields of a phase history with one entry per row: types and checks
+    _time_record      records of samples in time: checked, with their axes
     _time_samples     samples in time as samples over frequency, for PhaseHistory.from_time
 """
-
-__all__ = [
-    "antenna",
-    "antenna_array",
-    "antenna_pattern",
-    "concatenation",
-    "dates",
-    "image",
-    "image_grid",
-    "lazy_rows",
-    "listed_surface",
-    "orbit",
-    "phase_history",
-    "pointing",
-    "radar",
-    "row_positions",
-    "store",
-    "trajectory",
-    "waveform",
-]

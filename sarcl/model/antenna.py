@@ -93,7 +93,7 @@ class Antenna:
             taper = validation.array("antenna taper", self.taper, np.float64, (2,))
             if not ((taper >= 0) & (taper <= 1)).all():
                 raise ValueError(
-                    f"antenna taper is {taper.tolist()}; the illumination at the edges is 0 to 1 of that at the centre"
+                    f"antenna taper is {taper.tolist()}; illumination at the edges is 0 to 1 of the centre's"
                 )
             self._set("taper", taper)
         elif self.kind == "gaussian":
@@ -117,9 +117,7 @@ class Antenna:
             axis = validation.array(f"antenna {name}", getattr(self, name), np.float64, ("n",))
             step = np.diff(axis)
             if len(axis) < 4 or not (step > 0).all():
-                raise ValueError(
-                    f"antenna {name} must be at least 4 increasing angles, got {len(axis)}: {axis[:5].tolist()} ..."
-                )
+                raise ValueError(f"antenna {name} must be at least 4 increasing angles, got {axis[:5].tolist()} ...")
             if np.ptp(step) > 1e-6 * step.mean():
                 index = int(np.argmax(np.abs(step - step.mean())))
                 raise ValueError(
@@ -128,9 +126,7 @@ class Antenna:
                 )
             if np.abs(axis).max() > most * (1 + 1e-6):
                 largest = np.abs(axis).max()
-                raise ValueError(
-                    f"antenna {name} reaches {largest:g} rad, beyond {most:g}: were the angles in degrees?"
-                )
+                raise ValueError(f"antenna {name} reaches {largest:g} rad, beyond {most:g}: were they in degrees?")
             self._set(name, axis)
         shape = (len(self.azimuth), len(self.elevation))
         values = validation.array("antenna values", self.values, np.complex128, shape)

@@ -138,9 +138,7 @@ class AntennaArray:
         order = permutation(_size("n", n))
         if order is None:
             below, above = nearest_sizes(n)
-            raise ValueError(
-                f"no Costas array of {n} elements is known here; the nearest sizes are {below} and {above}"
-            )
+            raise ValueError(f"no Costas array of {n} elements is known; the nearest sizes are {below} and {above}")
         step = validation.number("frequency_step", frequency_step)
         with np.errstate(over="ignore"):
             offsets = order * step
@@ -169,9 +167,7 @@ class AntennaArray:
             return grouped
         f = validation.number("frequency", frequency, above=0) + grouped.offsets[0]
         if f.min() <= 0:
-            raise ValueError(
-                f"frequency {frequency:g} Hz gives a carrier of {f.min():g} Hz; every carrier must be above 0"
-            )
+            raise ValueError(f"frequency {frequency:g} Hz gives a carrier of {f.min():g} Hz; carriers are above 0")
         along = (self.positions - self.positions[first]) @ _towards(steer)
         return replace(grouped, weights=self.weights * np.exp(-2j * np.pi * f * along / constants.SPEED_OF_LIGHT))
 

@@ -26,9 +26,7 @@ def date(value: Date) -> np.datetime64:
         if not re.fullmatch(r"\d{4}-\d\d-\d\d(T\d\d:\d\d(:\d\d(\.\d{1,9})?)?)?", value):
             raise ValueError(f"date {argument!r} is not in UTC as wanted, such as '2021-12-23T05:10:21.029300'")
         if value[17:19] == "60":
-            raise ValueError(
-                f"date {argument!r} is within a leap second, and days have 86 400 s here; give another second"
-            )
+            raise ValueError(f"date {argument!r} is within a leap second, which days of 86 400 s have not")
     elif not isinstance(value, (datetime.date, np.datetime64)):
         raise ValueError(f"date {argument!r} is a {type(argument).__name__}; {WANTED}")
     try:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 from ..base import arguments, validation
 from ..base.report import Report
 from ..io import formats, hdf5
-from .image_grid import ImageGrid, pair
+from .image_grid import ImageGrid
 
 if TYPE_CHECKING:
     from types import EllipsisType
@@ -194,7 +194,7 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
         """
         if not self.grid.is_plane and self.grid.times is None:
             raise ValueError("multilook is for images on a plane, or by range_doppler; this grid lists its points")
-        a, b = pair("looks", looks)
+        a, b = validation.pair("looks", looks)
         a, b = validation.count("looks[0]", a), validation.count("looks[1]", b)
         rows, columns = self.grid.shape[0] // a, self.grid.shape[1] // b
         if rows == 0 or columns == 0:
@@ -232,44 +232,6 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
 
         ValueError where the image has not two axes, or for levels that no picture can have.
         """
-        return self._picture(floor_db, top_db, percentile, title)
-
-    def _repr_png_(self) -> bytes | None:
-        return self._picture(-50.0)._repr_png_()
-
-    def save(
-        self,
-        path: PathLike,
-        *,
-        floor_db: float = -50.0,
-        title: str | None = None,
-        top_db: float | None = None,
-        percentile: float | None = None,
-    ) -> None:
-        """Write "name.png" (the picture of `show`) or "name.h5" (lossless; `sarcl.read` opens it).
-
-        floor_db, top_db, percentile  of a picture, as in `show`; the PNG's text entries top_db, floor_db and
-                                      Description say what white and black are;  title  above the picture
-        On any exception `path` is as it was.
-        """
-        image_formats = formats.writing("picture", "image")
-        form = formats.named(arguments.path("path", path), image_formats)
-        if form is None:
-            endings = formats.suggested(image_formats, "'")
-            raise ValueError(f"image path {str(path)!r} {formats.ending_of(path)}; choose {endings}")
-        if form.is_picture:
-            from ..figures.decibels import write_png
-
-            write_png(self._picture(floor_db, top_db, percentile, title), path)
-            return
-        with form.functions.ImageWriter(path, formats.fields_of(self.grid), self.data.dtype) as writer:
-            for a, b in hdf5.blocks(writer.data):
-                writer.data[a:b] = np.asarray(self.data[a:b])
-            writer.close(image_fields(self))
-
-    def _picture(
-        self, floor_db: float, top_db: float | None = None, percentile: float | None = None, title: str | None = None
-    ) -> PIL.Image.Image:
         from ..figures.decibels import picture
 
         title = arguments.text("title", title)
@@ -304,6 +266,40 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
             origin=origin,
             names=names,
         )
+
+    def _repr_png_(self) -> bytes | None:
+        return self.show()._repr_png_()
+
+    def save(
+        self,
+        path: PathLike,
+        *,
+        floor_db: float = -50.0,
+        title: str | None = None,
+        top_db: float | None = None,
+        percentile: float | None = None,
+    ) -> None:
+        """Write "name.png" (the picture of `show`) or "name.h5" (lossless; `sarcl.read` opens it).
+
+        floor_db, top_db, percentile  of a picture, as in `show`; the PNG's text entries top_db, floor_db and
+                                      Description say what white and black are;  title  above the picture
+        On any exception `path` is as it was.
+        """
+        image_formats = formats.writing("picture", "image")
+        form = formats.named(arguments.path("path", path), image_formats)
+        if form is None:
+            endings = formats.suggested(image_formats, "'")
+            raise ValueError(f"image path {str(path)!r} {formats.ending_of(path)}; choose {endings}")
+        if form.is_picture:
+            from ..figures.decibels import write_png
+
+            picture = self.show(floor_db, top_db=top_db, percentile=percentile, title=title)
+            write_png(picture, path)
+            return
+        with form.functions.ImageWriter(path, formats.fields_of(self.grid), self.data.dtype) as writer:
+            for a, b in hdf5.blocks(writer.data):
+                writer.data[a:b] = np.asarray(self.data[a:b])
+            writer.close(image_fields(self))
 
 
 FIELDS = tuple(f.name for f in fields(Image) if f.name not in ("data", "grid"))  # as files hold them

@@ -14,13 +14,12 @@ from numpy.typing import ArrayLike, NDArray
 from ..base import arguments, validation
 from ..base.boxes import box
 from . import listed_surface
+from ._grid_checks import FARTHEST, cells, pixels_of, side, steps, text
 
 if TYPE_CHECKING:
     from ..base.types import PathLike
     from ..earth.elevation import ElevationModel, Geoid
 
-FARTHEST = 1e150  # m: squares of coordinates stay finite
-LONGEST = 2**53  # pixels along a side of a plane: indices are float64 in places
 MOST_NUMBERED = 2**63 - 1  # largest number of pixels that int64 can count
 
 
@@ -63,13 +62,12 @@ class ImageGrid:
             if value is None or (isinstance(value, np.ndarray) and not value.flags.writeable):
                 continue
             if name == "listed":
-                array = _cells(validation.converted(name, value, np.float64))
+                array = cells(validation.converted(name, value, np.float64))
             else:
                 array = validation.array(name, value, np.float64, ("n",) if name in ("times", "ranges") else (3,))
             object.__setattr__(self, name, array)
         if self.spacing is not None:
-            steps = enumerate(pair("spacing", self.spacing))
-            object.__setattr__(self, "spacing", tuple(validation.number(f"spacing[{i}]", d, above=0) for i, d in steps))
+            object.__setattr__(self, "spacing", steps(self.spacing))
             if len(self.shape) != 2 or self.center is None or self.x_axis is None or self.y_axis is None:
                 raise ValueError(
                     f"a plane has a shape of two axes, center, x_axis and y_axis, got shape {self.shape}; make it with "
@@ -92,20 +90,19 @@ class ImageGrid:
         normal), rows along y_axis = normal x x_axis; row 0 is drawn at the bottom.
         """
         center = validation.array("center", center, np.float64, (3,))
-        rows, columns = pair("shape", shape)
-        dy, dx = pair("spacing", spacing)
+        rows, columns = validation.pair("shape", shape)
         n = validation.direction("normal", normal)
         if x_axis is None:
             x_axis = (1.0, 0.0, 0.0) if abs(n[0]) < 0.999 else (0.0, 1.0, 0.0)
         x = validation.direction("x_axis", x_axis)
         x = x - (x @ n) * n
         if np.linalg.norm(x) < 1e-6:
-            raise ValueError(f"x_axis {_text(x_axis)} is along the normal {_text(n)}; give one that lies in the plane")
+            raise ValueError(f"x_axis {text(x_axis)} is along the normal {text(n)}; give one that lies in the plane")
         x /= np.linalg.norm(x)
         grid = cls(
-            shape=(_side("shape[0]", rows), _side("shape[1]", columns)),
+            shape=(side("shape[0]", rows), side("shape[1]", columns)),
             center=center,
-            spacing=(validation.number("spacing[0]", dy, above=0), validation.number("spacing[1]", dx, above=0)),
+            spacing=steps(spacing),
             x_axis=x,
             y_axis=np.cross(n, x),
         )
@@ -114,7 +111,7 @@ class ImageGrid:
         if far:
             assert grid.spacing is not None
             raise ValueError(
-                f"pixels of center {_text(center)} and spacing {_text(grid.spacing)} reach beyond {FARTHEST:g} m, "
+                f"pixels of center {text(center)} and spacing {text(grid.spacing)} reach beyond {FARTHEST:g} m, "
                 "where distances overflow; give both in metres"
             )
         return grid
@@ -137,7 +134,7 @@ class ImageGrid:
             if mask.dtype != bool or mask.shape != shape[:-1]:
                 raise ValueError(f"valid is {mask.dtype} of shape {mask.shape}, wanted bool of shape {shape[:-1]}")
             listed[~mask] = np.nan
-        return cls(shape=shape[:-1], listed=_cells(listed))
+        return cls(shape=shape[:-1], listed=cells(listed))
 
     @classmethod
     def on_terrain(
@@ -165,7 +162,7 @@ class ImageGrid:
         from ..earth.elevation import ElevationModel
 
         external = validation.flag("external", external)
-        steps = tuple(validation.number(f"spacing[{i}]", d, above=0) for i, d in enumerate(pair("spacing", spacing)))
+        spacing = steps(spacing)
         if not isinstance(dem, ElevationModel):
             dem = ElevationModel.read(
                 arguments.path("dem", dem),
@@ -177,7 +174,7 @@ class ImageGrid:
             )
         elif any(option is not None for option in (bounds, heights, geoid, nodata)):
             raise ValueError("bounds, heights, geoid and nodata are for files; an ElevationModel has been read already")
-        return cls.points(dem.grid_positions((steps[0], steps[1]), frame, center))
+        return cls.points(dem.grid_positions(spacing, frame, center))
 
     @classmethod
     def zero_doppler(cls, times: ArrayLike, ranges: ArrayLike, positions: ArrayLike) -> ImageGrid:
@@ -189,9 +186,9 @@ class ImageGrid:
         axes = []
         for name, value, n in (("times", times, grid.shape[0]), ("ranges", ranges, grid.shape[-1])):
             axis = validation.array(name, value, np.float64, (n,))
-            steps = np.diff(axis)
+            change = np.diff(axis)
             rounding = 4 * float(np.spacing(np.abs(axis).max())) if n > 2 else 0.0  # of absolute times
-            if not (steps > 0).all() or (n > 2 and np.ptp(steps) > 1e-6 * steps.mean() + rounding):
+            if not (change > 0).all() or (n > 2 and np.ptp(change) > 1e-6 * change.mean() + rounding):
                 raise ValueError(f"{name} must increase in even steps; give one per row (times) or column (ranges)")
             axes.append(axis)
         return replace(grid, times=axes[0], ranges=axes[1])
@@ -244,21 +241,7 @@ class ImageGrid:
 
         IndexError where a step is not positive or nothing is left.
         """
-        ranges = []
-        for axis, (n, selection) in enumerate(
-            zip(self.shape, (*slices, *[slice(None)] * len(self.shape)), strict=False)
-        ):
-            if not isinstance(selection, slice):
-                raise IndexError(
-                    f"slices[{axis}] is {selection!r:.60}; give a slice for each axis, such as numpy.s_[2:5]"
-                )
-            arguments.checked_index(f"slices[{axis}]", "a grid", selection, (n,))
-            pixels = range(*selection.indices(n))
-            if pixels.step < 0:
-                raise IndexError(f"axis {axis} of a grid is sliced with a step of {pixels.step}; steps are positive")
-            if len(pixels) == 0:
-                raise IndexError(f"no pixel is left of the {n} of axis {axis}; choose at least one")
-            ranges.append(pixels)
+        ranges = pixels_of(slices, self.shape)
         shape = tuple(map(len, ranges))
         if self.spacing is not None:
             rows, columns = ranges
@@ -319,9 +302,7 @@ class ImageGrid:
     def positions_of(self, index: tuple[np.ndarray, ...]) -> NDArray[np.float64]:
         """Positions, m (..., 3), of the pixels at whole indices into an image."""
         if not isinstance(index, tuple):
-            raise TypeError(
-                f"index is a {type(index).__name__}; give a tuple of whole numbers, one array for each axis"
-            )
+            raise TypeError(f"index is a {type(index).__name__}; give a tuple of whole numbers, an array per axis")
         if self.listed is None:
             return self.at(*index)
         arguments.checked_index("index", "a grid", index, self.shape)
@@ -408,45 +389,3 @@ class _Plane(NamedTuple):
     spacing: tuple[float, float]
     x_axis: NDArray[np.float64]
     y_axis: NDArray[np.float64]
-
-
-def _side(name: str, value: object) -> int:
-    """Number of pixels along a side of a plane; indices are int64 in places and float64 in others."""
-    count = validation.count(name, value)
-    if count > LONGEST:
-        raise ValueError(f"{name} is {count:.3g}; a side has at most {LONGEST:,} pixels: give fewer")
-    return count
-
-
-def _cells(positions: np.ndarray) -> np.ndarray:
-    """Positions, m (..., 3), read-only; ValueError for values that are neither finite nor the three NaN of an empty
-    cell."""
-    if -FARTHEST < positions.min() and positions.max() < FARTHEST:  # both are NaN where any is
-        return validation.sealed(positions)
-    empty = np.isnan(positions).all(axis=-1)
-    if empty.all():
-        raise ValueError("every cell of the grid is empty (NaN, or not valid); give at least one position")
-    bad = ~(np.abs(positions) < FARTHEST) & ~empty[..., None]
-    if bad.any():
-        index = np.unravel_index(int(np.argmax(bad)), bad.shape)
-        shown = ", ".join(str(int(i)) for i in index)
-        if np.isfinite(positions[index]):
-            raise ValueError(f"positions[{shown}] is {positions[index]:g} m, where distances overflow; give metres")
-        raise ValueError(
-            f"positions[{shown}] is {positions[index]}; give finite positions, and NaN in "
-            "all three coordinates of a cell that is empty"
-        )
-    return validation.sealed(positions)
-
-
-def _text(vector: ArrayLike) -> str:
-    return "(" + ", ".join(f"{v:g}" for v in np.asarray(vector)) + ")"
-
-
-def pair(name: str, value: Any) -> tuple[Any, Any]:
-    """A (row, column) pair, from a pair or one number for both."""
-    if validation.ndim(name, value) == 0:
-        return value, value
-    if np.shape(value) != (2,):
-        raise ValueError(f"{name} is {value!r}; wanted (row, column) or one number for both")
-    return value[0], value[1]

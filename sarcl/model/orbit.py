@@ -5,25 +5,22 @@ from __future__ import annotations
 import datetime
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base import arguments, validation
+from ..base.types import PathLike
 from ..earth import rotation, viewing, zero_doppler
 from ..earth.elevation import ElevationModel
 from ..earth.kepler import KeplerElements
 from ..earth.state_vectors import StateVectors
 from ..earth.two_line import TwoLineElements
 from ..io import orbit_files
-from ._orbit_arguments import places, span_of, together
-from ._orbit_attitude import Attitude, axes_of, ellipse
+from ._orbit_arguments import Attitude, axes_of, ellipse, places, span_of, together
 from .dates import Date, date, seconds
 from .trajectory import BYTES_PER_PULSE, Trajectory
-
-if TYPE_CHECKING:
-    from ..base.types import PathLike
 
 LINES_DAYS = 1.0  # days before and after the epoch of two-line elements, whose error grows by kilometres per day
 ROUNDING = 1e-9  # s: a time outside the span by less counts as its end
@@ -201,9 +198,7 @@ class Orbit:
         n_pulses = validation.count("n_pulses", n_pulses)
         validation.room(f"a track of {n_pulses:.3g} pulses", BYTES_PER_PULSE * float(n_pulses), "give fewer pulses")
         if (start is None) == (center is None):
-            raise ValueError(
-                "the time of the track is start or center (s since the epoch, or a date); give one of them"
-            )
+            raise ValueError("the time of the track is start or center (s since the epoch, or a date); give one")
         first = self._time("start", start) if center is None else self._time("center", center)
         if center is not None:
             first -= (n_pulses - 1) / 2 / prf

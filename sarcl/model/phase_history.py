@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack
+from typing import TYPE_CHECKING, Any, Literal, Unpack
 
 import numpy as np
-from numpy.typing import ArrayLike, DTypeLike, NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..base import arguments, constants, validation
 from ..base.report import Report
 from ..io import formats, hdf5
+from ._row_fields import LEAST_STEP, PER_ROW, RowFields, check_axis, one_per_row
 from .lazy_rows import in_memory, pick
 
 if TYPE_CHECKING:
@@ -19,32 +20,6 @@ if TYPE_CHECKING:
     from .antenna_array import AntennaArray
     from .trajectory import Trajectory
     from .waveform import Waveform
-
-# optional arrays with one entry per row: name -> (dtype, trailing shape)
-PER_ROW: dict[str, tuple[DTypeLike, tuple[int, ...]]] = {
-    "time": (np.float64, ()),
-    "tx_channel": (np.int64, ()),
-    "rx_channel": (np.int64, ()),
-    "polarization": ("U2", ()),
-    "weight": (np.float64, ()),
-    "tx_velocity": (np.float64, (3,)),
-    "rx_velocity": (np.float64, (3,)),
-}
-
-
-LEAST_STEP = 1e-20  # Hz: a range window of 1e28 m
-
-
-class RowFields(TypedDict, total=False):
-    """The optional fields of a PhaseHistory that have one entry per row."""
-
-    time: ArrayLike | None
-    tx_channel: ArrayLike | None
-    rx_channel: ArrayLike | None
-    polarization: ArrayLike | None
-    weight: ArrayLike | None
-    tx_velocity: ArrayLike | None
-    rx_velocity: ArrayLike | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,9 +99,11 @@ class PhaseHistory:
             if samples.flags.writeable or not samples.dtype.isnative:
                 samples = validation.sealed(np.array(samples, samples.dtype.newbyteorder("="), order="C"))
         self._set("samples", samples)
-        self._check_axis()
+        n = samples.shape[0]
+        if self.tx_channel is None and self.rx_channel is None:
+            check_axis(self.frequency, self.frequency_step, samples.shape)
         for name in ("frequency", "frequency_step", "reference_range"):
-            self._set(name, self._rows(name, getattr(self, name), np.float64, (), spread=True))
+            self._set(name, one_per_row(name, getattr(self, name), n, np.float64, spread=True))
         if not (self.frequency_step > 0).all():
             raise ValueError(
                 f"frequency_step[{int(np.argmin(self.frequency_step))}] is {self.frequency_step.min():g} Hz; "
@@ -144,18 +121,18 @@ class PhaseHistory:
             last = self.frequency + (samples.shape[1] - 1) * self.frequency_step
         if not np.isfinite(last).all():
             raise ValueError(
-                f"frequency_step is {self.frequency_step.max():g} Hz, at which the last frequency is infinite; give Hz"
+                f"frequency_step is {self.frequency_step.max():g} Hz, and the last frequency infinite; give Hz"
             )
-        self._set("tx", self._rows("tx", self.tx, np.float64, (3,)))
+        self._set("tx", one_per_row("tx", self.tx, n, np.float64, (3,)))
         if self.rx is None or self.rx is self._rx_of_tx:
             self._set("rx", self.tx)
             self._set("_rx_of_tx", self.tx)
         else:
-            self._set("rx", self._rows("rx", self.rx, np.float64, (3,)))
+            self._set("rx", one_per_row("rx", self.rx, n, np.float64, (3,)))
             self._set("_rx_of_tx", None)
         for name, (dtype, tail) in PER_ROW.items():
             if getattr(self, name) is not None:
-                self._set(name, self._rows(name, getattr(self, name), dtype, tail, spread=tail == ()))
+                self._set(name, one_per_row(name, getattr(self, name), n, dtype, tail, spread=tail == ()))
         if self.weight is not None and (self.weight < 0).any():
             bad = int(np.argmin(self.weight))
             raise ValueError(f"weight[{bad}] is {self.weight[bad]:g}; it cannot be negative")
@@ -167,52 +144,8 @@ class PhaseHistory:
         if self.array is not None and not hasattr(self.array, "offsets_at"):
             raise TypeError(f"array is a {type(self.array).__name__}; give a sarcl.AntennaArray or None")
 
-    def _check_axis(self) -> None:
-        """Raise ValueError where `frequency` is the axis of the samples, not one frequency per row.
-
-        With as many rows as samples the shape does not show it. Rows whose first frequencies lie frequency_step apart
-        are then taken for an axis, unless the rows name channels.
-        """
-        n_rows, n_samples = self.samples.shape
-        validation.ndim("frequency", self.frequency)
-        frequency = np.asarray(self.frequency)
-        if (
-            frequency.shape != (n_samples,)
-            or n_samples < 2
-            or self.tx_channel is not None
-            or self.rx_channel is not None
-        ):
-            return
-        is_axis = n_rows != n_samples
-        if not is_axis and np.ndim(self.frequency_step) == 0 and frequency.dtype.kind in "iuf":
-            steps, frequency_step = np.diff(frequency.astype(np.float64)), float(np.asarray(self.frequency_step))
-            is_axis = bool((np.abs(steps - frequency_step) <= 0.02 * abs(frequency_step)).all())
-        if is_axis:
-            raise ValueError(
-                f"frequency has {n_samples} values, one per sample: it is the axis of the samples, where the frequency "
-                "of sample 0 is wanted, one number or one per row; give frequency=f[0], frequency_step=f[1] - f[0]. "
-                "(Rows that do start frequency_step apart: give them tx_channel=, such as numpy.arange(n_rows))"
-            )
-
     def _set(self, name: str, value: object) -> None:
         object.__setattr__(self, name, value)
-
-    def _rows(
-        self, name: str, value: object, dtype: DTypeLike, tail: tuple[int, ...], spread: bool = False
-    ) -> np.ndarray:
-        """`value` with one entry per row; with `spread`, a single number is taken for all rows."""
-        n = self.samples.shape[0]
-        if validation.ndim(name, value) == 0 and spread:
-            validation.without_unit(name, value)
-            value = np.full(n, validation.unmasked(name, value))
-        rows = _words(name, value) if dtype == "U2" else validation.converted(name, value, dtype)
-        if rows.ndim != 1 + len(tail) or rows.shape[1:] != tail:
-            raise ValueError(f"{name} has shape {rows.shape}, wanted {(n, *tail)}")
-        if len(rows) != n:
-            raise ValueError(f"samples has {n} rows but {name} has {len(rows)}; give one {name} per row")
-        if rows.dtype.kind in "fc":
-            validation.finite(name, rows)
-        return validation.sealed(rows)
 
     @classmethod
     def from_time(
@@ -271,7 +204,8 @@ class PhaseHistory:
         below the bandwidth. SarclWarning: most of the energy lies at negative ranges.
         docs/guide/your_own_data.md has a recipe for each kind.
         """
-        from . import _time_samples
+        from ._time_record import TimeRecord
+        from ._time_samples import spectra_of
         from .row_positions import check_orbit, rows_of_track
 
         if (tx is None) == (track is None):
@@ -279,8 +213,8 @@ class PhaseHistory:
                 f"{'tx and track are both None' if tx is None else 'tx and track are both given'}; give exactly one: "
                 "positions, m (n_rows, 3), or a Trajectory"
             )
-        spectra = _time_samples.spectra_of(
-            _time_samples.TimeRecord(
+        spectra = spectra_of(
+            TimeRecord(
                 samples=samples,
                 kind=kind,
                 rate=rate,
@@ -439,13 +373,3 @@ def phase_history_fields(raw: PhaseHistory) -> dict[str, Any]:
         "array": None if raw.array is None else formats.fields_of(raw.array),
         "report": raw.report,
     }
-
-
-def _words(name: str, value: object) -> np.ndarray:
-    """Strings (n,), from strings or from bytes, as files hold them."""
-    words = np.asarray(value)
-    if words.dtype.kind == "S":
-        words = np.char.decode(words, "ascii")
-    if not all(isinstance(word, str) for word in words.ravel().tolist()):
-        raise ValueError(f"{name} must be strings such as 'HH', got {value!r:.80}")
-    return words.astype(str)

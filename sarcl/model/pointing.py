@@ -50,9 +50,7 @@ def stripmap(
     look = validation.number("look", look, least=0)
     squint = validation.number("squint", squint)
     if look > np.pi or abs(squint) >= np.pi / 2:
-        raise ValueError(
-            f"look is {look:g} and squint {squint:g} rad; they reach to pi and pi/2: were they in degrees?"
-        )
+        raise ValueError(f"look is {look:g} and squint {squint:g} rad, beyond pi or pi/2: were they in degrees?")
     sign = {"right": 1.0, "left": -1.0}[validation.choice("side", side, ("right", "left"))]
     along = _units("velocity", velocities(track), len(track))
     vertical = _vertical(track, up)
@@ -60,7 +58,7 @@ def stripmap(
     length = np.linalg.norm(right, axis=1, keepdims=True)
     if length.min() < 1e-6:
         raise ValueError(
-            f"the track goes straight up at pulse {int(np.argmin(length))}; no side is right of it: give up=..."
+            f"the track goes straight up at pulse {int(np.argmin(length))}; it has no right side: give up="
         )
     right /= length
     over = np.cross(right, along)
@@ -130,9 +128,7 @@ def rotations(name: str, value: ArrayLike, lead: tuple[int, ...]) -> np.ndarray:
     bad = np.atleast_1d((error > 1e-6) | (np.linalg.det(matrices) < 0))
     if bad.any():
         place = f"[{int(np.argmax(bad))}]" if lead else ""
-        raise ValueError(
-            f"{name}{place} is no rotation; its columns must be three unit vectors at right angles, right-handed"
-        )
+        raise ValueError(f"{name}{place} is no rotation; its columns are right-handed unit vectors at right angles")
     return matrices
 
 

@@ -97,7 +97,5 @@ def noise_variance(raw: PhaseHistory, temperature: float, waveform: Waveform | N
     temperature = validation.number("temperature", temperature, above=0)
     pulse = raw.waveform if waveform is None else waveform
     if pulse is None:
-        raise ValueError(
-            "raw has no waveform, so the energy of its pulse is unknown; set raw.waveform, or give nesz_db=..."
-        )
+        raise ValueError("raw has no waveform, so its pulse energy is unknown; set raw.waveform, or give nesz_db=")
     return np.asarray(BOLTZMANN * temperature / (raw.frequency_step * pulse.peak_energy_density))

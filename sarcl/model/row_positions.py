@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from .phase_history import PhaseHistory
 
 FARTHEST, FASTEST = 6e6, 1e3  # m from the origin and m/s from which on positions are those of a satellite
-GIVEN = ("time", "tx_velocity", "rx_velocity")  # fields of rows that a track has
+OF_TRACK = ("time", "tx_velocity", "rx_velocity")  # fields of rows that a track has
 
 
 def at_arrival(track: Trajectory, pulses: np.ndarray, reference_range: np.ndarray) -> dict[str, np.ndarray]:
@@ -40,7 +40,7 @@ def rows_of_track(
 ) -> dict[str, Any]:
     """Fields of a phase history whose rows are the pulses of a track. ValueError for another number of them."""
     validation.instance("track", track, Trajectory)
-    duplicates = [name for name in GIVEN if rows.get(name) is not None] + ["rx"] * (rx is not None)
+    duplicates = [name for name in OF_TRACK if rows.get(name) is not None] + ["rx"] * (rx is not None)
     if duplicates:
         raise ValueError(f"{duplicates[0]} is given, and so is track, which has its own; leave one out, or give tx=")
     if len(track) != len(reference_range):

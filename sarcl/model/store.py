@@ -8,21 +8,20 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
 
 from ..base import arguments, validation
+from ..base.types import PathLike
 from ..io import formats, sarcl_hdf5
+from ._row_fields import PER_ROW
 from .antenna_array import AntennaArray
 from .concatenation import concatenate
 from .image import FIELDS, Image, image_fields
 from .image_grid import ImageGrid
-from .phase_history import PER_ROW, PhaseHistory, phase_history_fields
+from .phase_history import PhaseHistory, phase_history_fields
 from .waveform import Waveform
-
-if TYPE_CHECKING:
-    from ..base.types import PathLike
 
 
 def finish_image(writer: sarcl_hdf5.ImageWriter, grid: ImageGrid, **fields: Any) -> Image:

@@ -90,9 +90,7 @@ class Trajectory:
     def known_times(self) -> NDArray[np.float64]:
         """Times, s (n,); ValueError where the track has none."""
         if self.times is None:
-            raise ValueError(
-                "the track has no times, which this needs; give Trajectory.circle prf= or speed=, or Trajectory times"
-            )
+            raise ValueError("the track has no times, which this needs; give Trajectory times, or circle(..., prf=)")
         return self.times
 
     def picked(self, pulses: slice | np.ndarray) -> Trajectory:

@@ -15,6 +15,7 @@ For other folders:
     range_profiles          samples in frequency to oversampled range profiles and back
     run_options             options that every verb has
     shared_tile             tiles of a grid that a work-group sums in local memory
+    subapertures            pulses of a track decimated to every n-th position, and the error of that
     tile_constants          records of tiles and pulses on a device: what the points of a tile share for a pulse
     tiles                   points cut into tiles, as kernels/geometry.clh reads them
     transforms              FFTs of rows or columns of arrays that are on a device
@@ -25,24 +26,3 @@ For this folder alone:
 
     _grid_image             from a grid of wavenumbers on a device to the image, there or on the host
 """
-
-__all__ = [
-    "cost_model",
-    "device_profiles",
-    "double_double",
-    "error_bounds",
-    "interpolation",
-    "interpolator_choice",
-    "nufft2d",
-    "plan",
-    "polynomials",
-    "pulse_geometry",
-    "range_profiles",
-    "run_options",
-    "shared_tile",
-    "tile_constants",
-    "tiles",
-    "transforms",
-    "weighted_samples",
-    "windows",
-]

@@ -51,6 +51,13 @@ MERGED_PROFILE = 6.0  # per sample of a range profile
 LEAF = {64: 0.35, 32: 0.45, 16: 0.8}  # per contribution to a leaf tile computed by lines, by its side in pixels
 LEAF_PIXELS = 0.1  # per contribution to a leaf tile computed pixel by pixel, on top of its taps
 
+# Factorised echoes, in contributions (2026-11-26).
+LEAF_POINT = 0.35  # per point and kept pulse of the smallest cells, on top of its taps
+LEAF_ROW, LEAF_SAMPLE = 10.0, 0.2  # per profile of a smallest cell, and per sample of it
+EXPAND_TAP, EXPAND_FILTER_TAP = 0.012, 0.012  # per sample of a cell's profile that is moved to a pulse of a larger cell
+EXPAND_ROW = 12.0  # per such profile
+CELL_POINT = 70.0  # per point: cells and their tables
+
 # Range-Doppler images, in contributions (2026-11-22).
 REFERENCED = 8.0  # per sample: weights and reference range
 COMPRESSION_FILTER = 20.0  # per sample of a Doppler bin: secondary range compression
@@ -111,6 +118,11 @@ SPECTRAL_SPREAD = 0.1  # per scatterer spread over the map
 SPECTRAL_PLAN, SPECTRAL_PLAN_POINT = 4e4, 0.35  # a plan that transforms few responses, and per point (2026-11-26)
 SPECTRAL_PLANNED = 0.12  # per sample of a response that is transformed while planning (2026-11-23)
 SPECTRAL_SAMPLE = 0.35  # per wavenumber along the track and frequency: transforms, and the samples read from them
+
+
+def expanding(samples: float, taps: int, filter_taps: int) -> float:
+    """Cost of adding a cell's profile to a pulse of a larger cell, in contributions."""
+    return samples * (taps * EXPAND_TAP + filter_taps * EXPAND_FILTER_TAP) + EXPAND_ROW
 
 
 class Gathering(NamedTuple):

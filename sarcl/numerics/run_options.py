@@ -33,8 +33,5 @@ class RunOptions(Options):
     )
     device: DeviceChoice | None = option(None, "see `sarcl.devices`", in_files=False)
     progress: Progress | None = option(
-        None,
-        "called as progress(stage, done, total)",
-        lambda name, value: arguments.progress(value),
-        in_files=False,
+        None, "called as progress(stage, done, total)", lambda name, value: arguments.progress(value), in_files=False
     )

@@ -25,17 +25,3 @@ For this folder alone:
     _trial         kernels whose results are known, which a device must pass
     _trial_record  results of devices' trials, on disk
 """
-
-__all__ = [
-    "choose_device",
-    "device",
-    "device_list",
-    "failures",
-    "fft",
-    "fft_batches",
-    "launch_numbers",
-    "memory_budget",
-    "native_functions",
-    "pipeline",
-    "programs",
-]

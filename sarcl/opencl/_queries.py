@@ -6,32 +6,12 @@ import ctypes
 import ctypes.util
 import struct
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from ..base import host_memory
 from ..base.text import first_line
 
 PCI_BUS_INFO = 0x410F  # CL_DEVICE_PCI_BUS_INFO_KHR: domain, bus, device and function
-
-
-class Facts(NamedTuple):
-    """What a driver says of a device, named as the fields of DeviceInfo.
-
-    warp  0 where the driver does not say it;  why  a question that it must answer and refuses, else empty
-    """
-
-    name: str
-    kind: str
-    vector_width: int
-    memory: int
-    max_alloc: int
-    units: int
-    driver: str
-    local_memory: int
-    max_group: int
-    warp: int
-    pci: str
-    why: str
 
 
 def platforms() -> list[tuple[str, str, list[Any]]]:
@@ -65,8 +45,12 @@ def text_of(thing: Any, question: str) -> str:
     return str(asked(thing, question, "")).replace("\0", "").strip() or "unknown"
 
 
-def facts(handle: Any) -> Facts:
-    """What the driver says of a device, with the least that kernels may rely on where it refuses a question."""
+def facts(handle: Any) -> dict[str, Any]:
+    """What the driver says of a device, with the least that kernels may rely on where it refuses a question.
+
+    Named as the fields of DeviceInfo; warp: 0 where the driver does not say it; why: a question that it must answer and
+    refuses, else empty.
+    """
     import pyopencl
 
     kinds = {pyopencl.device_type.GPU: "gpu", pyopencl.device_type.CPU: "cpu"}
@@ -81,7 +65,7 @@ def facts(handle: Any) -> Facts:
         why = f"its driver says that it has {memory} bytes of memory, and buffers of {max_alloc} bytes"
     if kind == "cpu":  # some drivers add the swap space
         memory = int(min(memory, host_memory.installed()))
-    return Facts(
+    return dict(
         name=text_of(handle, "name"),
         kind=kind,
         vector_width=8 if kind == "cpu" else 1,

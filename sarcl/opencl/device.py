@@ -21,7 +21,9 @@ from .failures import buffer_bytes, explained
 from .programs import build, kernels_of, names_in, quiet, source
 
 if TYPE_CHECKING:
-    from pyopencl import Buffer as Buffer  # what upload, zeros and empty return, for annotations
+    from pyopencl import Buffer as Buffer  # returned by upload, zeros and empty
+else:
+    Buffer = Any  # in annotations alone: pyopencl is loaded with the first device
 
 GROUP = 16  # work-items per group on a CPU (1 where the size does not divide by it), for kernels of any group size
 

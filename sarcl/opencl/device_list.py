@@ -81,7 +81,7 @@ def _listed() -> tuple[tuple[DeviceInfo, Any], ...]:
     found: list[tuple[DeviceInfo, Any]] = []
     for platform, _, handles in _queries.platforms():
         for handle in handles:
-            facts = _queries.facts(handle)._asdict()
+            facts = _queries.facts(handle)
             facts["why"] = facts["why"] or NOT_TRIED
             info = DeviceInfo(
                 index=len(found), platform=platform, works=False, fp64=False, fast_fp64=False, rate=0, **facts

@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import functools
 import time
-from collections.abc import Callable, Iterator, Sequence
+import tomllib
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Any, Concatenate, Literal, ParamSpec
+from pkgutil import get_data
+from typing import Any, Literal
 
 import numpy as np
 
 from ..figures import html
 from ..figures.html import Block, heading, listed, page, table, terms, words
+from ..figures.plots import Curve
+from . import PAPERS
 
+Ends = tuple[float, float]
 Basis = Literal["paper", "geometry", "theory"]
 BASES: dict[Basis, str] = {
     "paper": "printed in the paper",
@@ -61,57 +66,105 @@ class Row:
         return {"published" if name == "expected" and self.basis == "paper" else name: out[name] for name in out}
 
 
-P = ParamSpec("P")
+ROW_TEXTS = {"item", "source", "expected", "measured", "why", "rule", "cause", "basis"}
 
 
-def _adding(block: Callable[P, Block]) -> Callable[Concatenate[Section, P], None]:
-    """A method that adds a block to a section, with the arguments of the function that makes the block."""
-
-    @functools.wraps(block)
-    def add(section: Section, /, *args: P.args, **options: P.kwargs) -> None:
-        section.parts.append(block(*args, **options))
-
-    return add
+@functools.cache
+def _texts(paper: str) -> dict[str, Any]:
+    """Texts of a paper's page: NAME.toml beside this file."""
+    return tomllib.loads((get_data(__package__, f"{paper}.toml") or b"").decode())
 
 
 @dataclass
 class Section:
-    """A section as it grows: rows, blocks of the page, and numbers for JSON."""
+    """A section as it grows: rows, blocks of the page, and numbers for JSON.
+
+    texts  its paragraphs, and for each item of a row a table of published value, source, criterion and remarks
+    words  what stands in the {} of texts, beside the words of a call
+    """
 
     key: str
     title: str
+    texts: dict[str, Any] = field(default_factory=dict)
+    words: dict[str, object] = field(default_factory=dict)
     rows: list[Row] = field(default_factory=list)
     parts: list[Block] = field(default_factory=list)
     numbers: dict[str, Any] = field(default_factory=dict)
     seconds: float = 0.0
 
-    def number(
-        self, item: str, source: str, expected: float, measured: float, within: float, unit: str = "",
-        form: str = ".3f", why: str = "", cause: Cause = "", *, basis: Basis = "paper",
-    ) -> None:  # fmt: skip
-        """A row that holds where `measured` lies within `within` of the expected number."""
-        printed, value = (f"{v:{form}} {unit}".strip() for v in (expected, measured))
-        holds, rule = bool(abs(measured - expected) <= within), f"within {within:.3g} {unit}".strip()
-        cause = "" if holds else cause
-        self.rows.append(Row(item, source, printed, value, holds, why, plain(measured), rule, cause, basis))
+    @classmethod
+    def of(cls, paper: str, key: str, **words: object) -> Section:
+        """A section with the texts of its paper's file; words fill all of them."""
+        texts = _texts(paper)[key]
+        return cls(key, texts["title"].format(**words), texts, words)
 
-    def states(
-        self, item: str, source: str, expected: str, measured: str, holds: object, why: str = "", value: object = None,
-        *, rule: str, cause: Cause = "", basis: Basis = "paper",
-    ) -> None:  # fmt: skip
-        """A row for a statement in words. `holds`: whether the measured value agrees, by the criterion `rule`."""
-        cause = "" if holds else cause
-        self.rows.append(Row(item, source, expected, measured, bool(holds), why, plain(value), rule, cause, basis))
+    def number(self, item: str, measured: float, **words: Any) -> None:
+        """A row that holds where `measured` lies `within` so much of the expected number; words: as `states` has them,
+        and form and unit of both numbers."""
+        text = {"unit": "", "form": ".3f", **self.texts.get(item, {}), **words}
+        printed, value = (f"{v:{text['form']}} {text['unit']}".strip() for v in (text["expected"], measured))
+        rule = f"within {text['within']:.3g} {text['unit']}".strip()
+        holds = abs(measured - text["expected"]) <= text["within"]
+        self.states(item, measured, holds, **{**words, "expected": printed, "measured": value, "rule": rule})
 
-    def say(self, text: str) -> None:
-        """A paragraph."""
-        self.parts.append(words(text))
+    def states(self, item: str, value: object, holds: object, **words: Any) -> None:
+        """A row. `holds`: whether the measured value agrees, by the criterion `rule`.
+
+        The texts of the row are those of the item in the paper's file. In {} they name the value and the words; a
+        word that is called as a text stands in its place.
+        """
+        texts = {"item": item, "source": "", **self.texts.get(item, {})}
+        filled = {
+            name: text.format(value=value, **self.words | words)
+            for name, text in texts.items()
+            if isinstance(text, str)
+        }
+        row = {name: text for name, text in {**filled, **words}.items() if name in ROW_TEXTS}
+        self.rows.append(
+            Row(**row | {"cause": "" if holds else row.get("cause", "")}, holds=bool(holds), value=plain(value))
+        )
+
+    def say(self, key: str = "text", **words: object) -> None:
+        """A paragraph of the paper's file, with the words in its {}."""
+        self.parts.append(html.words(self.texts[key].format(**self.words | words)))
+
+    def list(self, key: str = "errors") -> None:
+        """A list of paragraphs of the paper's file."""
+        self.parts.append(listed(self.texts[key]))
 
     def draw(self, *figures: Block) -> None:
         """Figures."""
         self.parts += figures
 
-    plot, picture, table = _adding(html.plot), _adding(html.picture), _adding(html.table)
+    def _figure(self, key: str, words: Mapping[str, object]) -> dict[str, Any]:
+        """Texts of a figure or table of the paper's file: names of axes or a head, and a caption."""
+        texts, words = {"caption": "", **self.texts["figures"][key]}, self.words | dict(words)
+        head = [text.format(**words) for text in texts.pop("head", [])]
+        return {name: text.format(**words) for name, text in texts.items()} | {"head": head}
+
+    def plot(
+        self,
+        key: str,
+        curves: Sequence[Curve],
+        dots: bool | Sequence[str] = False,
+        log_x: bool = False,
+        **words: object,
+    ) -> None:
+        """A figure of curves; words fill its texts."""
+        texts = self._figure(key, words)
+        self.parts.append(html.plot(curves, texts["x"], texts["y"], texts["caption"], dots=dots, log_x=log_x))
+
+    def picture(
+        self, key: str, values: np.ndarray, x: Ends, y: Ends, words: Mapping[str, object] | None = None, **look: Any
+    ) -> None:
+        """A figure of values between the ends of x and y, in grey; words fill its texts."""
+        texts = self._figure(key, words or {})
+        self.parts.append(html.picture(values, x, y, texts["x"], texts["y"], texts["caption"], **look))
+
+    def table(self, key: str, rows: Sequence[Sequence[Any]], text: bool = False, **words: object) -> None:
+        """A table; words fill its texts."""
+        texts = self._figure(key, words)
+        self.parts.append(table(texts["head"], rows, texts["caption"], text=text))
 
     def keep(self, **numbers: object) -> None:
         """Numbers behind the figures, six digits of each."""
@@ -144,6 +197,22 @@ class Paper:
     terms: tuple[tuple[str, str], ...] = ()
     main: tuple[str, ...] = ()
     long: bool = False
+
+    @classmethod
+    def of(
+        cls,
+        name: str,
+        lab: Callable[..., Any],
+        sections: tuple[Callable[[Any], Section], ...],
+        long: bool = False,
+        **words: object,
+    ) -> Paper:
+        """A paper with the texts of its file; words fill that of a quick run."""
+        texts = _texts(name)
+        about, quick = texts["about"].format(source=PAPERS[name]), texts["quick"].format(**words)
+        return cls(
+            name, texts["title"], about, lab, sections, quick, tuple(texts["terms"].items()), tuple(texts["main"]), long
+        )
 
     def run(self, lab: object) -> Iterator[Section]:
         """Its sections, one after the other, timed; lab: as `self.lab` makes it."""

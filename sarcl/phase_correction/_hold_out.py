@@ -16,10 +16,9 @@ from typing import Any
 import numpy as np
 
 from ..base.validation import sealed
-from . import _bright_points, _displacement, _phase_gradient, _phase_smoothing, _smooth_search
+from . import _bright_points, _displacement, _phase_gradient, _phase_smoothing, _search
 from ._aperture_view import NO_LAG, ApertureView, Errors
-from ._constant_echo import without_constant_echo
-from ._echo_parts import near_and_far, phase_of
+from ._echo_parts import near_and_far, phase_of, without_constant_echo
 
 log = logging.getLogger(__name__)
 
@@ -251,9 +250,7 @@ def _sharpest(view: ApertureView, errors: Errors, curves: _Curves, halves: list[
 
 def _searched_as_curves(view: ApertureView, halves: list[_Echoes], free: list[np.ndarray]) -> _Curves:
     """Phases of few cosines of both halves of the band, searched as such; free: those of single pulses."""
-    searched = [
-        _smooth_search.curves(half.corrected, phase, view.window) for half, phase in zip(halves, free, strict=True)
-    ]
+    searched = [_search.curves(half.corrected, phase, view.window) for half, phase in zip(halves, free, strict=True)]
     pairs = list(zip(*searched, strict=True))
 
     def gains(pair: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
@@ -261,7 +258,7 @@ def _searched_as_curves(view: ApertureView, halves: list[_Echoes], free: list[np
 
     levels = [gains(pair) for pair in pairs]
     best = int(np.argmax([level.prod() for level in levels]))
-    return _Curves(_smooth_search.MODES[best], list(pairs[best]), levels[best])
+    return _Curves(_search.MODES[best], list(pairs[best]), levels[best])
 
 
 def _least_of_curves(curves: _Curves, closeness: Callable[[np.ndarray, np.ndarray], float]) -> float:

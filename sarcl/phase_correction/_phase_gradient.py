@@ -54,6 +54,22 @@ def gradient(v: np.ndarray, widths: list[float]) -> np.ndarray:
     return phase
 
 
+def focused(v: np.ndarray, middle: np.ndarray, number: int, window: float) -> tuple[np.ndarray, float]:
+    """Phase (n,) after pass `number` of a search in contributions v (n, columns), and its gain in sharpness.
+
+    middle  (n, places): contributions at the places themselves;  window  Doppler bins about a point at last
+    A pass starts from phase gradient autofocus where that is sharper than no phase, and sharpens: the larger its
+    number, the nearer to the points.
+    """
+    n = len(v)
+    widths = [max(n / 2 ** (number + i / 2), NARROWEST) for i in range(8)]
+    width = max(n / 4**number, window)
+    starts = [np.zeros(n), gradient(middle, widths)]
+    levels = [sharpness(v, start, width) for start in starts]
+    phase = sharpen(v, starts[int(np.argmax(levels))], width)
+    return phase, sharpness(v, phase, width) / max(levels[0], 1e-300)
+
+
 def sharpen(v: np.ndarray, phase: np.ndarray, width: float, steps: int = 30, enough: float = 1e-4) -> np.ndarray:
     """The phase (n,) near `phase` where sum |I|^4 over `width` Doppler bins about 0 has its maximum.
 

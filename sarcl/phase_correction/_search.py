@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from . import _phase_gradient
+from . import _phase_gradient, _phase_smoothing
 from ._aperture_view import LAGS, NO_LAG, WINDOW, ApertureView, Errors
 
 log = logging.getLogger(__name__)
@@ -24,6 +24,8 @@ RANGE_MODES = 8  # cosines over the aperture for range errors, or an eighth of t
 # through range cells; where only places on one side see it, as at the edge of a grid, that looks like a range error
 APART = WINDOW
 RANGE_GAIN = 1.015  # least gain in sharpness by which range errors are accepted
+MODES = 4, 8, 16, 32  # cosines over the aperture, in a search for smooth phases
+STEPS = 15  # steps of that search, for each number of cosines
 RANGE_CELLS = 0.05  # least rms of range errors, cells, at which they are tried: smaller ones can hardly be seen
 
 
@@ -39,20 +41,14 @@ def _narrow(view: ApertureView, errors: Errors, ranges: bool, passes: int) -> Er
     from them: by phase gradient autofocus, then by sharpness.
     """
     n, lags = view.n, LAGS if ranges else NO_LAG
-    zero = np.zeros(n)
     for k in range(passes):
         places = view.brightest(errors, max(n / 2 / 4**k, APART if ranges else 8.0))
         v = view.contributions(errors, places, lags)
         flat = v.reshape(n, -1)
-        widths = [max(n / 2 ** (k + i / 2), _phase_gradient.NARROWEST) for i in range(8)]
-        width = max(n / 4**k, WINDOW)
-        starts = [zero, _phase_gradient.gradient(v[:, :, len(lags) // 2], widths)]
-        levels = [_phase_gradient.sharpness(flat, start, width) for start in starts]
-        step = _phase_gradient.sharpen(flat, starts[int(np.argmax(levels))], width)
-        gain = _phase_gradient.sharpness(flat, step, width) / max(levels[0], 1e-300)
+        step, gain = _phase_gradient.focused(flat, v[:, :, len(lags) // 2], k, WINDOW)
         cells = np.zeros(n)
         if ranges:
-            cells = _phase_gradient.range_shift(v, step, width, min(RANGE_MODES, n // 8)) / 2
+            cells = _phase_gradient.range_shift(v, step, max(n / 4**k, WINDOW), min(RANGE_MODES, n // 8)) / 2
         errors = view.shift_removed((errors[0] + step, errors[1] + cells * view.cell))
         log.debug("pass %d: %d places, sharpness x %.4f, range %.3f cells", k, len(places), gain, abs(cells).max())
         if gain < ENOUGH and abs(cells).max() < MOVED:
@@ -148,3 +144,29 @@ def _migrates(view: ApertureView, errors: Errors) -> bool:
     cells = _phase_gradient.range_shift(v, zero, view.window, min(RANGE_MODES, view.n // 8)) / 2
     log.debug("under the phase alone the echoes move by %.3f range cells", abs(cells).max())
     return bool(abs(cells).max() >= MOVED)
+
+
+def curves(v: np.ndarray, free: np.ndarray, width: float) -> list[np.ndarray]:
+    """Phases (n,) of MODES cosines and a slope that sharpen contributions v (n, k).
+
+    In crowded scenes free phases of single pulses make fewer points than there are.
+
+    free   phase (n,) of the same contributions, each pulse by itself, which is a start besides the curve of fewer
+           cosines: a large error is far from no phase at all. The sharper of the two is taken
+    width  Doppler bins about 0, as of `_phase_gradient.sharpen`, whose steps are projected onto the cosines. MODES of
+           half the pulses or more are left out.
+    """
+    phase, phases = np.zeros(len(v)), []
+    for modes in (m for m in MODES if 2 * m < len(v)):
+        ends = [_ascended(v, start, modes, width) for start in (phase, _phase_smoothing.smooth(free, modes))]
+        phase = max(ends, key=lambda end: _phase_gradient.sharpness(v, end, width))
+        phases.append(phase)
+    return phases
+
+
+def _ascended(v: np.ndarray, phase: np.ndarray, modes: int, width: float) -> np.ndarray:
+    """The phase (n,) of so many cosines near `phase` that sharpens contributions v (n, k)."""
+    for _ in range(STEPS):
+        step = _phase_gradient.sharpen(v, phase, width, steps=1) - phase
+        phase = _phase_smoothing.lowest(phase + np.angle(np.exp(1j * step)), modes)
+    return phase

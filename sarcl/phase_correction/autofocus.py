@@ -149,8 +149,8 @@ def autofocus(
     tick = _ticker(progress, _search.searches(view, bool(range_errors)) + 2)
     errors = _search.search(view, bool(range_errors), tick)
     unseen = unseen_pixels(make_task(weighted, grid, None, None, False, True, beam, True))
-    if unseen and unseen.warned(wraps=False):
-        warn(unseen.warned(wraps=False))
+    if unseen and unseen.warning(wraps=False):
+        warn(unseen.warning(wraps=False))
     errors, tests = _hold_out.cross_validated(view, errors, tick)
     if not tests["found"]:
         log.warning("no correction by autofocus passed cross-validation; the data are unchanged: %s", tests["reason"])
@@ -187,9 +187,7 @@ def _aperture_view(raw: PhaseHistory, rows: np.ndarray, grid: ImageGrid) -> Aper
     if grid.x_axis is not None and grid.y_axis is not None:
         look = look @ np.stack([grid.x_axis, grid.y_axis], axis=1)
     if np.linalg.norm(look) < 1e-9:
-        raise ValueError(
-            "tx and rx are the same in every pulse; without an aperture there is no cross-range image to focus"
-        )
+        raise ValueError("tx and rx are the same in every pulse: without an aperture nothing is focused across range")
     axes = np.linalg.svd(look, full_matrices=False)[2][:2]
     shift_phase = 2 * np.pi * frequency / SPEED_OF_LIGHT * look @ axes.T
     scale = float(np.sqrt(energy.max()))

@@ -9,12 +9,10 @@ For other folders:
     backproject    the image equation, term by term
     certain_shadows  shadows that miss a facet, or cover it, whatever antenna of several casts them
     compress       the matched filter
-    echo           the echo equation, term by term
+    equations      delay, echo, image, field of an array, full-wave updates, waveform forming: in a textbook's order
     facet          echo of triangular facets by physical optics
     facet_pieces   pieces of rough facets, and their random numbers
-    fdtd           the steps of a Yee grid
-    field          field of an array
-    formed_echo    waveform forming: sums of currents, term by term
+    fdtd           layers, bodies and incident waves of a Yee grid
     geometry       half the two-way path less the reference range
     image          multilooking
     interp         interpolation of one profile
@@ -22,7 +20,7 @@ For other folders:
     map_drift      correlation and displacement of two looks along the track
     merge          profiles about a tile's centre, and their decimation
     mie            echoes of a sphere
-    polar_format   the image of plane waves
+    polar_format   the image of plane waves, and the spreading of samples on a grid
     quality        a point response by brute force
     range_doppler  reading of a profile along the range migration
     rays           the first facet on a ray, and whether any lies between two points
@@ -31,30 +29,3 @@ For other folders:
     transposition  what comes before and after an FFT of columns
     weighted_samples  samples times weights, turned to other reference ranges
 """
-
-__all__ = [
-    "backproject",
-    "certain_shadows",
-    "compress",
-    "echo",
-    "facet",
-    "facet_pieces",
-    "fdtd",
-    "field",
-    "formed_echo",
-    "geometry",
-    "image",
-    "interp",
-    "lit_part",
-    "map_drift",
-    "merge",
-    "mie",
-    "polar_format",
-    "quality",
-    "range_doppler",
-    "rays",
-    "shadow",
-    "spectral_echo",
-    "transposition",
-    "weighted_samples",
-]

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..base.constants import SPEED_OF_LIGHT
 from ..model.phase_history import PhaseHistory
-from .geometry import half_path
+from .equations import excess_delay
 
 
 def backproject(
@@ -38,7 +38,7 @@ def backproject(
     image, power = np.zeros(len(points), np.complex128), np.zeros(len(points))
     clear = np.ones(len(points), bool)
     for p in range(raw.n_rows):
-        delay = 2 / np.longdouble(SPEED_OF_LIGHT) * half_path(raw.tx[p], raw.rx[p], points, raw.reference_range[p])
+        delay = excess_delay(raw.tx[p], raw.rx[p], points, raw.reference_range[p])
         if longer is not None:
             delay = delay + 2 / np.longdouble(SPEED_OF_LIGHT) * longer[:, p]
         position = abs(delay) * (2 * raw.frequency_step[p])

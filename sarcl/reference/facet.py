@@ -8,14 +8,8 @@ import numpy as np
 
 from ..base.constants import SPEED_OF_LIGHT
 from ..base.vectors import unit
-from ..scattering.physical_optics import (
-    UP,
-    _nodes,
-    normals_and_areas,
-    scattering_matrix,
-    triangle_integral,
-)
-from .geometry import half_path
+from ..scattering.physical_optics import UP, normals_and_areas, scattering_matrix, triangle_integral
+from .equations import excess_delay, triangle_nodes
 
 
 def facet_amplitude(
@@ -62,17 +56,14 @@ def facet_echo(
     """
     frequencies, tx, rx = np.asarray(frequencies, float), np.asarray(tx, float), np.asarray(rx, float)
     eps = np.broadcast_to(np.asarray(permittivity, complex), (len(frequencies), len(triangles)))
-    normals, areas = normals_and_areas(triangles)
+    normals = normals_and_areas(triangles)[0]
     out = np.zeros((len(frequencies), 2, 2), complex)
-    for facet, normal, area, column in zip(triangles, normals, areas, eps.T, strict=True):
+    for facet, normal, column in zip(triangles, normals, eps.T, strict=True):
         edges = facet - np.roll(facet, 1, axis=0)
         slope = unit(tx - facet) + unit(rx - facet)
         phase = 2 * np.pi * frequencies.max() / SPEED_OF_LIGHT * np.abs(slope @ edges.T).max()
-        nodes, weights = _nodes(int(phase / 4) + 40 + extra_nodes)
-        s, t = nodes[:, None, None], nodes[None, :, None]
-        points = (facet[0] + s * ((1 - t) * (facet[1] - facet[0]) + t * (facet[2] - facet[0]))).reshape(-1, 3)
-        weight = (2 * area * nodes[:, None] * weights[:, None] * weights).ravel()
-        delay = 2 / np.longdouble(SPEED_OF_LIGHT) * half_path(tx, rx, points, reference_range)
+        points, weight = triangle_nodes(facet, int(phase / 4) + 40 + extra_nodes)
+        delay = excess_delay(tx, rx, points, reference_range)
         at = facet.mean(axis=0)[None] if by_facet else points
         for i, f in enumerate(frequencies):
             if i == 0 or column[i] != column[i - 1]:  # S changes with frequency only through the permittivity

@@ -1,4 +1,4 @@
-"""The steps of a Yee grid, term by term: kernels/fdtd_vacuum.cl, fdtd_lists.cl and fdtd_coupled.cl.
+"""Layers, bodies and incident waves of a Yee grid: kernels/fdtd_vacuum.cl, fdtd_lists.cl and fdtd_coupled.cl.
 
 Fields are float64 (3, nx, ny, nz): component a of E stands at half a cell along axis a, of H at half a cell along the
 other two. H is the magnetic field times the impedance of vacuum. Fields, `old` and `psi` are changed in place. Cells of
@@ -9,29 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-CYCLIC = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
-
-
-def before(field: np.ndarray, axis: int) -> np.ndarray:
-    """field[i] - field[i - 1] along an axis; beyond the grid fields are 0."""
-    return np.diff(field, axis=axis, prepend=0)
-
-
-def after(field: np.ndarray, axis: int) -> np.ndarray:
-    """field[i + 1] - field[i] along an axis; beyond the grid fields are 0."""
-    return np.diff(field, axis=axis, append=0)
-
-
-def update_e(e: np.ndarray, h: np.ndarray, s: float) -> None:
-    """E += s curl H."""
-    for a, b, c in CYCLIC:
-        e[a] += s * (before(h[c], b) - before(h[b], c))
-
-
-def update_h(e: np.ndarray, h: np.ndarray, s: float) -> None:
-    """H -= s curl E."""
-    for a, b, c in CYCLIC:
-        h[a] -= s * (after(e[c], b) - after(e[b], c))
+from .equations import CYCLIC, after, before, update_e
 
 
 def absorb(
@@ -80,10 +58,10 @@ def _across(curl: np.ndarray, at: np.ndarray, weight: np.ndarray) -> np.ndarray:
         some = component == a
         cell = [x[some] for x in node]
         for along, first in ((b, 0), (c, 2)):
-            for after in (0, 1):
+            for ahead in (0, 1):
                 for side in (0, 1):
-                    place = (x + (n == a) * after - (n == along) * side for n, x in enumerate(cell))
-                    added[some] += weight[first + after][some] * curl[(along, *place)]
+                    place = (x + (n == a) * ahead - (n == along) * side for n, x in enumerate(cell))
+                    added[some] += weight[first + ahead][some] * curl[(along, *place)]
     return added
 
 

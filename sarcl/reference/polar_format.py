@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..base.constants import SPEED_OF_LIGHT
 from ..model.phase_history import PhaseHistory
 from ..numerics.interpolation import Interpolator
-from .geometry import half_path
+from .equations import plane_delay, row_image
 
 
 def polar_format(
@@ -17,26 +16,17 @@ def polar_format(
     sample_weight: np.ndarray | None = None,
     row_weight: np.ndarray | None = None,
 ) -> tuple[np.ndarray, float]:
-    """I(x) = sum_p sum_n s_p(f_n) exp(+j 2 pi f_n (tau - tau_ref)) at points, m (n, 3), for plane waves.
+    """I(x) = sum_p sum_n s_p(f_n) exp(+j 2 pi f_n (tau - tau_ref)) at points, m (n, 3), for waves plane at `center`.
 
-    tau = (1/c)(|T - c| + |R - c| - (u + v).(x - c)), u and v the unit vectors from `center` c, m (3,), to the antennas
-    T and R.
     Returns I complex128 (n,) and the norm it would have if samples had random phases.
     """
-    n = np.arange(raw.n_samples)
     sample_weight = np.ones(raw.n_samples) if sample_weight is None else sample_weight
     row_weight = np.ones(raw.n_rows) if row_weight is None else row_weight
     image, power = np.zeros(len(points), np.complex128), 0.0
     for p in range(raw.n_rows):
-        shift = half_path(raw.tx[p], raw.rx[p], center[None], raw.reference_range[p])[0]
-        away = (np.stack([raw.tx[p], raw.rx[p]]) - center).astype(np.longdouble)
-        along = (points - center) @ (away / np.sqrt((away**2).sum(axis=1, keepdims=True))).mean(axis=0)
-        delay = 2 / np.longdouble(SPEED_OF_LIGHT) * (shift - along)
+        delay = plane_delay(raw.tx[p], raw.rx[p], points, center, raw.reference_range[p])
         samples = raw.read(p, p + 1)[0] * (sample_weight * row_weight[p])
-        first = (raw.frequency[p] * delay) % 1
-        step = (raw.frequency_step[p] * delay) % 1
-        cycles = first.astype(np.float64)[:, None] + step.astype(np.float64)[:, None] * n
-        image += (np.exp(2j * np.pi * cycles) * samples).sum(axis=1)
+        image += row_image(samples, raw.frequency[p], raw.frequency_step[p], delay)
         power += float((abs(samples) ** 2).sum())
     return image, float(np.sqrt(len(points) * power))
 

@@ -24,18 +24,3 @@ For this folder alone:
     _frequency_nodes       frequencies at which amplitudes are computed
     _rough_surface         scattering diagrams of rough facets (SARAS)
 """
-
-__all__ = [
-    "antenna_weight_error",
-    "antenna_weights",
-    "facet_kinds",
-    "facet_plan",
-    "facets",
-    "mesh_quality",
-    "physical_optics",
-    "pulse_nodes",
-    "random_surface",
-    "rough_pieces",
-    "scatterers",
-    "subdivision",
-]

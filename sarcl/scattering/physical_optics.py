@@ -19,7 +19,6 @@ Where SARAS's print contradicts the physics, the equations are corrected:
 
 from __future__ import annotations
 
-import functools
 import math
 
 import numpy as np
@@ -189,12 +188,3 @@ def scattering_parts(
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.asarray(np.einsum("...i,...i->...", a, b))
-
-
-@functools.cache
-def _nodes(n: int) -> tuple[np.ndarray, np.ndarray]:
-    """Gauss-Legendre nodes and weights on [0, 1]."""
-    from scipy.special import roots_legendre
-
-    x, w = roots_legendre(n)
-    return (x + 1) / 2, w / 2

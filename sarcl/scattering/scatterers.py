@@ -29,7 +29,7 @@ Progress = Callable[[int, int], object]  # called as progress(pulse, pulses)
 SMALL, MANY_SMALL, FEW_SMALL = 10.0, 100, 0.01
 # Of a facet of median width, by which shadows move between pulses that they are looked at from: largest, and over the
 # accuracy of amplitudes
-FINEST = 0.25, 4.0
+FINEST = 0.25, 3.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,6 +12,7 @@ For this folder alone:
     _schema      tables and keys that a scenario may hold
     _simulating  the function that makes the echoes, and its arguments
     _tables      Python objects (Scene, Trajectory, ...) written as tables
+    _verb_call   the call of a verb that a section describes
 """
 
 from .scenario import Scenario, load, loads

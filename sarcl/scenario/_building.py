@@ -51,7 +51,7 @@ class Builder:
                 )
             self._check_local(kind, "trajectory")
             return self._aimed(self.one("trajectory"), "pointing")
-        orbit, table = self.orbit(), dict(self.scenario.trajectory["orbit"])  # type: ignore[index]
+        orbit, table = self.orbit(), dict(self.section("trajectory")["orbit"])
         place = self.place()
         if place is not None and not {"start", "center"} & set(table):
             with self.scenario.where.blame(("place",), {}):
@@ -62,7 +62,7 @@ class Builder:
         """The receiver's Trajectory, None where it moves with the transmitter."""
         if self.scenario.receiver is None:
             return None
-        self._check_local(next(iter(self.scenario.receiver)), "receiver")
+        self._check_local(next(iter(self.section("receiver"))), "receiver")
         return self._aimed(self.one("receiver"), "receiver_pointing" if self.scenario.receiver_pointing else "pointing")
 
     def antenna(self) -> Antenna | tuple[Antenna, Antenna] | None:
@@ -96,7 +96,7 @@ class Builder:
 
         materials = {
             name: self.call(("materials", name), table, partial(Material, name=name))
-            for name, table in (self.scenario.materials or {}).items()
+            for name, table in self.scenario.tables.get("materials", {}).items()
         }
         scene, origin = None, self.place()
         for kind, value in self.section("scene").items():

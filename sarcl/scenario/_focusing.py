@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Any
 
-from .. import verbs
 from . import _schema
 from ._building import Builder
 from ._earth import side_of, time_over
+from ._verb_call import VerbCall
 
 if TYPE_CHECKING:
     from ..model.image_grid import ImageGrid
@@ -34,38 +33,19 @@ def image_text(scenario: Scenario) -> str:
     return f"{section}, {' x '.join(map(str, scenario.build_grid().shape))} pixels"
 
 
-def focus(scenario: Scenario, raw: PhaseHistory, grid: ImageGrid | None, options: Mapping[str, Any]) -> Any:
-    """See `Scenario.focus`."""
-    subjects, given, blame = _arguments(scenario, raw, grid, options)
-    with blame:
-        return getattr(verbs, section_of(scenario))(*subjects, **given)
-
-
-def plan_focus(scenario: Scenario, raw: PhaseHistory, grid: ImageGrid | None, options: Mapping[str, Any]) -> Any:
-    """See `Scenario.plan_focus`."""
-    subjects, given, blame = _arguments(scenario, raw, grid, options)
-    with blame:
-        return verbs.plan(getattr(verbs, section_of(scenario)), *subjects, **given)
-
-
-def _arguments(
-    scenario: Scenario, raw: PhaseHistory, grid: ImageGrid | None, options: Mapping[str, Any]
-) -> tuple[tuple[Any, ...], dict[str, Any], AbstractContextManager[None]]:
-    """Echoes and grid; options; and the context in which a message that names a key names its line."""
+def call_of(scenario: Scenario, raw: PhaseHistory, grid: ImageGrid | None, options: Mapping[str, object]) -> VerbCall:
+    """The call that makes the image of echoes, on a grid or that of the scenario; options  precede the section's."""
     section = section_of(scenario)
     if section == "range_doppler":
         keys = _range_doppler_options(scenario, options)
     else:
         keys = Builder(scenario).options(section, options)
     own = {k: v for k, v in keys.items() if k not in options}
-    blame = scenario.where.blame((section,), own, always=False)
-    if section == "range_doppler":
-        if grid is not None:
-            raise ValueError(
-                "range_doppler makes a grid of its own, by zero-Doppler time and slant range; give grid=None"
-            )
-        return (raw,), keys, blame
-    return (raw, scenario.build_grid() if grid is None else grid), keys, blame
+    if section != "range_doppler":
+        return VerbCall(scenario.where, section, (raw, scenario.build_grid() if grid is None else grid), keys, own)
+    if grid is not None:
+        raise ValueError("range_doppler makes a grid of its own, by zero-Doppler time and slant range; give grid=None")
+    return VerbCall(scenario.where, section, (raw,), keys, own)
 
 
 def _range_doppler_options(scenario: Scenario, options: Mapping[str, Any]) -> dict[str, Any]:

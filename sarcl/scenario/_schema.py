@@ -43,52 +43,41 @@ _TYPES = {
 _ON = inspect.Parameter(ON, inspect.Parameter.KEYWORD_ONLY, default=None)
 
 
+ECHOES = ("echo", "spectral_echo", "fullwave_echo")  # sections for echoes, and for images: one of each at most
+IMAGES = ("backproject", "polar_format", "range_doppler")
+
+
+def _kinds(place: str, names: str) -> dict[str, str]:
+    return {name: place + name for name in names.split()}
+
+
+_TRACK = {**_kinds("model.trajectory:Trajectory.", "line circle"), "": "model.trajectory:Trajectory"}
+_POINTING = _kinds("model.pointing:", "spotlight stripmap fixed")
+_ANTENNA = _kinds("model.antenna:Antenna.", "isotropic rectangular gaussian table")
 # section -> name of the table -> the call that it describes, as file and name; "" is the section's own table
 _CALLS: dict[str, dict[str, str]] = {
-    "waveform": {kind: f"model.waveform:Waveform.{kind}" for kind in ("chirp", "tone", "sampled")},
-    "orbit": {
-        **{kind: f"model.orbit:Orbit.{kind}" for kind in ("kepler", "tle", "states")},
-        "": "model.orbit:Orbit.read",
-    },
-    "trajectory": {
-        "line": "model.trajectory:Trajectory.line",
-        "circle": "model.trajectory:Trajectory.circle",
-        "orbit": "model.orbit:Orbit.trajectory",
-        "": "model.trajectory:Trajectory",
-    },
-    "pointing": {kind: f"model.pointing:{kind}" for kind in ("spotlight", "stripmap", "fixed")},
-    "receiver": {
-        "line": "model.trajectory:Trajectory.line",
-        "circle": "model.trajectory:Trajectory.circle",
-        "": "model.trajectory:Trajectory",
-    },
-    "receiver_pointing": {kind: f"model.pointing:{kind}" for kind in ("spotlight", "stripmap", "fixed")},
-    "antenna": {kind: f"model.antenna:Antenna.{kind}" for kind in ("isotropic", "rectangular", "gaussian", "table")},
-    "receiver_antenna": {
-        kind: f"model.antenna:Antenna.{kind}" for kind in ("isotropic", "rectangular", "gaussian", "table")
-    },
+    "waveform": _kinds("model.waveform:Waveform.", "chirp tone sampled"),
+    "orbit": {**_kinds("model.orbit:Orbit.", "kepler tle states"), "": "model.orbit:Orbit.read"},
+    "trajectory": {**_TRACK, "orbit": "model.orbit:Orbit.trajectory"},
+    "pointing": _POINTING,
+    "receiver": _TRACK,
+    "receiver_pointing": _POINTING,
+    "antenna": _ANTENNA,
+    "receiver_antenna": _ANTENNA,
     "array": {
-        **{kind: f"model.antenna_array:AntennaArray.{kind}" for kind in ("linear", "planar", "costas")},
+        **_kinds("model.antenna_array:AntennaArray.", "linear planar costas"),
         "": "model.antenna_array:AntennaArray",
     },
     "radar": {"": "model.radar:Radar"},
     "materials": {"": "scene.material:Material"},
     "place": {"": "earth.place:Place.above"},
-    "scene": {
-        kind: f"scene.scene:Scene.{kind}" for kind in ("points", "from_mesh", "from_heights", "from_dem", "facets")
-    },  # and all shapes
-    "grid": {kind: f"model.image_grid:ImageGrid.{kind}" for kind in ("plane", "points", "on_terrain", "zero_doppler")},
-    "echo": {"": "verbs:echo"},
-    "spectral_echo": {"": "verbs:spectral_echo"},
-    "fullwave_echo": {"": "verbs:fullwave_echo"},
+    "scene": _kinds("scene.scene:Scene.", "points from_mesh from_heights from_dem facets"),  # and all shapes
+    "grid": _kinds("model.image_grid:ImageGrid.", "plane points on_terrain zero_doppler"),
+    **{verb: {"": f"verbs:{verb}"} for verb in ECHOES},
     "noise": {"": "effects.noise:add_noise"},
-    "backproject": {"": "verbs:backproject"},
-    "polar_format": {"": "verbs:polar_format"},
-    "range_doppler": {"": "verbs:range_doppler"},
+    **{verb: {"": f"verbs:{verb}"} for verb in IMAGES},
 }
 SECTIONS = tuple(_CALLS)
-ECHOES = ("echo", "spectral_echo", "fullwave_echo")  # sections for echoes, and for images: one of each at most
-IMAGES = ("backproject", "polar_format", "range_doppler")
 
 
 def calls(section: str) -> dict[str, Call]:
@@ -192,8 +181,8 @@ def check_section(section: str, table: Any, where: Where) -> None:
         for path, part in tables_of(section, kind, value):
             if not isinstance(part, Mapping):
                 raise ValueError(f"{where.text((section,), kind)} {kind} is {_shown(part)}, wanted a table")
-            lying = section == "scene" and kind not in ("from_heights", "from_dem")
-            _check_table(path, part, known[kind], where, extra={ON: _ON} if lying else {})
+            stands = section == "scene" and kind not in ("from_heights", "from_dem")
+            _check_table(path, part, known[kind], where, stands=stands)
 
 
 def check_choices(given: Collection[str], where: Where) -> None:
@@ -217,19 +206,15 @@ def tables_of(section: str, kind: str, value: Any) -> list[tuple[Path, Any]]:
 
 
 def _check_table(
-    path: Path,
-    table: Mapping[str, Any],
-    call: Call,
-    where: Where,
-    kinds: list[str] | None = None,
-    extra: Mapping[str, inspect.Parameter] | None = None,
+    path: Path, table: Mapping[str, Any], call: Call, where: Where, kinds: Collection[str] = (), stands: bool = False
 ) -> None:
-    known = {**parameters(call), **(extra or {})}
+    """kinds: names of tables beside this one;  stands: it describes a part of the scene that may stand on others."""
+    known = {**parameters(call), **({ON: _ON} if stands else {})}
     for key, value in table.items():
-        if kinds and key in kinds:
+        if key in kinds:
             raise ValueError(f"{where.text(path, key)} {key} is {_shown(value)}, wanted a table")
         if key not in known:
-            raise ValueError(f"{where.text(path, key)} {unknown(key, [*known, *(kinds or [])], 'key')}")
+            raise ValueError(f"{where.text(path, key)} {unknown(key, [*known, *kinds], 'key')}")
         if isinstance(value, Mapping) and "ElevationModel" in str(known[key].annotation):
             from ..earth.elevation import ElevationModel
 

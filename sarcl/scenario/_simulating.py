@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Any
 
-from .. import verbs
 from ._earth import earth_fixed
 from ._schema import ECHOES
+from ._verb_call import VerbCall
 
 if TYPE_CHECKING:
     from .scenario import Scenario
@@ -21,24 +20,8 @@ def section_of(scenario: Scenario) -> str:
     return next((name for name in ECHOES if getattr(scenario, name) is not None), "echo")
 
 
-def simulate(scenario: Scenario, options: Mapping[str, Any]) -> Any:
-    """The echoes; options  take precedence over the section's keys."""
-    subjects, given, blame = _arguments(scenario, options)
-    with blame:
-        return getattr(verbs, section_of(scenario))(*subjects, **given)
-
-
-def plan(scenario: Scenario, options: Mapping[str, Any]) -> Any:
-    """The forecast of the echoes."""
-    subjects, given, blame = _arguments(scenario, options)
-    with blame:
-        return verbs.plan(getattr(verbs, section_of(scenario)), *subjects, **given)
-
-
-def _arguments(
-    scenario: Scenario, options: Mapping[str, Any]
-) -> tuple[tuple[Any, ...], dict[str, Any], AbstractContextManager[None]]:
-    """Scene, waveform and track; options; and the context in which a message that names a key names its line."""
+def call_of(scenario: Scenario, options: Mapping[str, Any]) -> VerbCall:
+    """The call that makes the echoes; options  take precedence over the section's keys."""
     section = section_of(scenario)
     subjects = scenario.build_scene(), scenario.build_waveform(), scenario.build_track()
     parts: dict[str, Any] = {"receiver": scenario.build_receiver()}
@@ -55,4 +38,4 @@ def _arguments(
     keys = {**earth_fixed(scenario.build_place(), getattr(scenario, section) or {}), **options}
     keys = {k: tuple(v) if isinstance(v, list) else v for k, v in keys.items()}
     own = {k: v for k, v in keys.items() if k not in options}
-    return subjects, {**parts, **keys}, scenario.where.blame((section,), own, always=False)
+    return VerbCall(scenario.where, section, subjects, {**parts, **keys}, own)

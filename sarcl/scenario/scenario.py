@@ -11,10 +11,9 @@ from ..base import arguments
 from ..base.forecast import Forecast
 from ..base.text import unknown
 from ..io import input_paths, toml
-from . import _schema, _simulating
+from . import _focusing, _schema, _simulating
 from ._building import Builder
 from ._earth import pass_text
-from ._focusing import check_window, focus, image_text, plan_focus, section_of
 from ._schema import Where
 
 if TYPE_CHECKING:
@@ -33,7 +32,7 @@ if TYPE_CHECKING:
     from ..scene.scene import Scene
     from ..verbs import BackprojectKeywords, EchoKeywords
 
-Table = dict[str, Any]  # table of a scenario: keys with plain values or further tables
+Table = Mapping[str, object]  # table of a scenario: keys with plain values or further tables
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,58 +62,29 @@ class Scenario:
     names the file, line and table of an unknown or missing key, a wrong type, or a value that is refused.
     """
 
-    waveform: Table | None = None
-    trajectory: Table | None = None
-    receiver: Table | None = None
-    scene: Table | None = None
-    grid: Table | None = None
+    waveform: Waveform | Table | None = None
+    trajectory: Trajectory | Table | None = None
+    receiver: Trajectory | Table | None = None
+    scene: Scene | Table | None = None
+    grid: ImageGrid | Table | None = None
     echo: Table | None = None
     backproject: Table | None = None
-    materials: Table | None = None
+    materials: Mapping[str, Material | Table] | None = None
     pointing: Table | None = None
-    antenna: Table | None = None
+    antenna: Antenna | Table | None = None
     receiver_pointing: Table | None = None
-    receiver_antenna: Table | None = None
-    array: Table | None = None
-    radar: Table | None = None
+    receiver_antenna: Antenna | Table | None = None
+    array: AntennaArray | Table | None = None
+    radar: Radar | Table | None = None
     noise: Table | None = None
-    orbit: Table | None = None
-    place: Table | None = None
+    orbit: Orbit | Table | None = None
+    place: Place | Table | None = None
     spectral_echo: Table | None = None
     fullwave_echo: Table | None = None
     polar_format: Table | None = None
     range_doppler: Table | None = None
-    folder: Path = Path()
+    folder: PathLike = Path()
     where: Where = field(default_factory=Where, repr=False)
-
-    if TYPE_CHECKING:  # types that the constructor takes; the fields above have the types that are stored
-
-        def __init__(
-            self,
-            waveform: Waveform | Mapping[str, object] | None = None,
-            trajectory: Trajectory | Mapping[str, object] | None = None,
-            receiver: Trajectory | Mapping[str, object] | None = None,
-            scene: Scene | Mapping[str, object] | None = None,
-            grid: ImageGrid | Mapping[str, object] | None = None,
-            echo: Mapping[str, object] | None = None,
-            backproject: Mapping[str, object] | None = None,
-            materials: Mapping[str, Material | Mapping[str, object]] | None = None,
-            pointing: Mapping[str, object] | None = None,
-            antenna: Antenna | Mapping[str, object] | None = None,
-            receiver_pointing: Mapping[str, object] | None = None,
-            receiver_antenna: Antenna | Mapping[str, object] | None = None,
-            array: AntennaArray | Mapping[str, object] | None = None,
-            radar: Radar | Mapping[str, object] | None = None,
-            noise: Mapping[str, object] | None = None,
-            orbit: Orbit | Mapping[str, object] | None = None,
-            place: Place | Mapping[str, object] | None = None,
-            spectral_echo: Mapping[str, object] | None = None,
-            fullwave_echo: Mapping[str, object] | None = None,
-            polar_format: Mapping[str, object] | None = None,
-            range_doppler: Mapping[str, object] | None = None,
-            folder: PathLike = Path(),
-            where: Where = ...,
-        ) -> None: ...
 
     def __post_init__(self) -> None:
         from ..scene.scene import Scene
@@ -202,9 +172,9 @@ class Scenario:
 
         With [spectral_echo] or [fullwave_echo] they are computed by that function, whose options these are then.
         """
-        check_window(self)
+        _focusing.check_window(self)
         level = self._noise_level()
-        return self._noisy(_simulating.simulate(self, options), level)
+        return self._noisy(_simulating.call_of(self, options).run(), level)
 
     def _noisy(self, raw: PhaseHistory, level: dict[str, Any]) -> PhaseHistory:
         """Echoes with the noise of [noise], of that level."""
@@ -221,7 +191,7 @@ class Scenario:
         """Arguments of `add_noise`; ValueError, before echoes are computed, where they are not one level."""
         if self.noise is None:
             return {}
-        from ..effects.noise_level import level_of
+        from ..effects.noise import level_of
 
         level = Builder(self).options("noise", {})
         with self.where.blame(("noise",), level):
@@ -230,9 +200,9 @@ class Scenario:
 
     def plan(self, **options: Unpack[EchoKeywords]) -> Forecast[PhaseHistory]:
         """Forecast of `simulate` with these options, as `sarcl.plan` makes it; its run() returns the echoes."""
-        check_window(self)
+        _focusing.check_window(self)
         level = self._noise_level()
-        forecast: Forecast[PhaseHistory] = _simulating.plan(self, options)
+        forecast: Forecast[PhaseHistory] = _simulating.call_of(self, options).plan()
         return replace(forecast, run=lambda: self._noisy(forecast.run(), level))
 
     @property
@@ -243,11 +213,11 @@ class Scenario:
     @property
     def needs_grid(self) -> bool:
         """Whether `focus` wants a grid: range_doppler makes its own."""
-        return section_of(self) != "range_doppler"
+        return _focusing.section_of(self) != "range_doppler"
 
     def describe_image(self) -> str:
         """The function that makes the image, and its grid, in words."""
-        return image_text(self)
+        return _focusing.image_text(self)
 
     def default_grid_options(self) -> dict[str, Any]:
         """What [place] says about a grid that is chosen from the echoes: its centre."""
@@ -260,14 +230,14 @@ class Scenario:
         With [polar_format] or [range_doppler] the image is made by that function, whose options these are then;
         range_doppler makes a grid of its own.
         """
-        image: Image = focus(self, raw, grid, options)
+        image: Image = _focusing.call_of(self, raw, grid, options).run()
         return image
 
     def plan_focus(
         self, raw: PhaseHistory, grid: ImageGrid | None = None, **options: Unpack[BackprojectKeywords]
     ) -> Forecast[Image]:
         """Forecast of `focus` with these options, as `sarcl.plan` makes it; its run() returns the image."""
-        forecast: Forecast[Image] = plan_focus(self, raw, grid, options)
+        forecast: Forecast[Image] = _focusing.call_of(self, raw, grid, options).plan()
         return forecast
 
 

@@ -13,5 +13,3 @@ For this folder alone:
     _solids    triangles of surfaces of revolution, prisms and geodesic spheres
     _tank      the parts of a tank
 """
-
-__all__ = ["material", "scene", "shapes", "terrain", "triangles"]

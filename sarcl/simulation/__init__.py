@@ -9,6 +9,7 @@ For other folders:
     echo_request       what is asked of all channels alike: options, for one device
     echo_sampling      rows and frequencies that echoes are written to
     echo_task          one task of echo: its arguments, checked
+    kernel_images      error of scatterers that lie so evenly that the images of the interpolation kernel add up
     scene_echoes       a scene prepared for the kernels, and its echoes added channel by channel
     scene_options      options that echo and spectral_echo share
     scene_plan         shares of the tolerance for the parts of a scene, and how its facets are cut within them
@@ -16,6 +17,7 @@ For other folders:
     spreading          plan, tiles and sums that points and facets share
     track_options      options that every verb of echoes shares
     channels/          echoes of the channels of an array
+    points/            echoes of points, directly or factorised
     spectral/          spectral_echo(): echoes of straight tracks by Fourier transforms
 
 For this folder alone:
@@ -25,28 +27,8 @@ For this folder alone:
     _echo_work         how much work echoes are, by the numbers of pieces and pulses
     _exact_facets      few facets in few pulses and samples, added up in float64 on the host
     _facet_spreading   facets to range profiles
-    _kernel_images     error of scatterers that lie so evenly that the images of the kernel add up
     _piece_tiling      pieces of rough facets in tiles, on the device that cut them
     _planned_echoes    the method of echoes, and the plan of the scene for it
-    _point_spreading   points to range profiles: a nonuniform FFT of type 1
     _single_channel    echoes of one transmitting and one receiving antenna
     _unseen_scene      refusal of scenes outside every beam or range window, before anything is planned
 """
-
-__all__ = [
-    "channels",
-    "echo",
-    "echo_check",
-    "echo_options",
-    "echo_output",
-    "echo_request",
-    "echo_sampling",
-    "echo_task",
-    "scene_echoes",
-    "scene_options",
-    "scene_plan",
-    "scene_preparation",
-    "spectral",
-    "spreading",
-    "track_options",
-]

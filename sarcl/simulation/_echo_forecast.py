@@ -24,9 +24,11 @@ from ..base.text import duration
 from ..model.phase_history import PhaseHistory
 from ..numerics import cost_model
 from ._echo_work import EchoWork
-from ._planned_echoes import PlannedEchoes
+from ._planned_echoes import Method, PlannedEchoes
+from ._single_channel import SingleEchoes
 from .echo_output import bytes_of, pulses_at_once
 from .echo_task import EchoTask
+from .points.factorized import FactorizedSpreader
 from .scene_echoes import Added, SceneEchoes
 from .scene_plan import SHADOWS, parts_of, samples_shadows
 from .scene_preparation import warn_of_curves
@@ -90,13 +92,34 @@ def forecast_of(
 def _timed(task: EchoTask, planned: PlannedEchoes, prepared: SceneEchoes, work: EchoWork) -> Estimate:
     """The errors of all pulses, and from a few of them the seconds and contributions of all."""
     shape, method = planned.channels.shape, planned.method
+    n_pulses, pulse_by_pulse = shape[0], method
+    quiet = replace(prepared, request=replace(prepared.request, clock=Clock()))
+    by_levels: list[FactorizedSpreader] = []  # their work is not that of single pulses
+    if isinstance(method, SingleEchoes):
+        pulse_by_pulse, by_levels = method.apart(quiet)
+    seconds, pairs = sum(one.seconds for one in by_levels), float(sum(len(one) for one in by_levels) * n_pulses)
+    timed = None
+    if pairs < len(quiet) * n_pulses:
+        timed = _timed_pulses(quiet, pulse_by_pulse, shape, work)
+        seconds, pairs = seconds + timed.seconds * n_pulses, pairs + timed.contributions * n_pulses
+    room = prepared.request.budget
+    at_once = min(method.pulses(room), pulses_at_once(shape, task.options.out, room))
+    if timed is not None and -(-n_pulses // at_once) * method.runs > MOST_PLANS * n_pulses:
+        return Estimate(timed.error_terms, timed.words, seconds, pairs)
+    whole = Added()
+    for start in range(0, n_pulses, at_once):
+        whole += method.planned(quiet, start, min(at_once, n_pulses - start))
+    return Estimate(whole.error_terms, whole.plan, seconds, pairs)
+
+
+def _timed_pulses(scene: SceneEchoes, method: Method, shape: tuple[int, ...], work: EchoWork) -> Estimate:
+    """Seconds and contributions of one pulse, from a few that are computed."""
     n_pulses, most = shape[0], max(TIMED_SHARE * work.seconds, LEAST_TIMED)
     n = int(np.clip(most / (work.adding / n_pulses), 1, max(1, n_pulses // 8)))
-    quiet = replace(prepared, request=replace(prepared.request, clock=Clock()))
 
     def timed(first: int) -> tuple[float, Added]:
         block, begin = np.zeros((n, *shape[1:]), np.complex64), time.perf_counter()
-        added = method.fill(quiet, block, first, 0, len(quiet) * n)
+        added = method.fill(scene, block, first, 0, len(scene) * n)
         return time.perf_counter() - begin, added
 
     for first in ((n_pulses - n) // 2, 0, n_pulses - n):  # elsewhere more may be seen
@@ -105,13 +128,7 @@ def _timed(task: EchoTask, planned: PlannedEchoes, prepared: SceneEchoes, work: 
             break
     if seconds > SLOWER * n * work.adding / n_pulses:
         seconds = min(seconds, timed(first)[0])
-    whole, room = added, prepared.request.budget
-    at_once = min(method.pulses(room), pulses_at_once(shape, task.options.out, room))
-    if -(-n_pulses // at_once) * method.runs <= MOST_PLANS * n_pulses:
-        whole = Added()
-        for start in range(0, n_pulses, at_once):
-            whole += method.planned(quiet, start, min(at_once, n_pulses - start))
-    return Estimate(whole.error_terms, whole.plan, seconds / n * n_pulses, added.counts.contributing / n * n_pulses)
+    return Estimate(added.error_terms, added.plan, seconds / n, added.counts.contributing / n)
 
 
 def _allotted(planned: PlannedEchoes) -> tuple[ErrorTerm, ...]:

@@ -23,9 +23,9 @@ from ..scattering.pulse_nodes import every, plan_pulse_nodes
 from ..scattering.rough_pieces import RoughFacets
 from ..scene.triangles import centroids
 from ..visibility.illumination import Span
-from ._kernel_images import PatchSamples, sample_patches
 from ._piece_tiling import PieceTiling
 from .echo_request import EchoRequest
+from .kernel_images import PatchSamples, sample_patches
 from .spreading import (
     GROUP,
     ChannelView,

@@ -15,6 +15,7 @@ from .echo_check import measure_error
 from .echo_output import EchoOutput
 from .echo_request import EchoRequest
 from .echo_task import EchoTask
+from .points.factorized import FactorizedSpreader
 from .scene_echoes import Added, ChannelEchoes, SceneEchoes
 from .scene_plan import SeenScene
 from .spreading import Band, Counts
@@ -100,6 +101,13 @@ class SingleEchoes:
         if self._channel is None:
             self._channel = scene.channel(rows.seen.antennas, rows.task.waveform, rows.frequencies)
         return replace(self._channel, scene=scene)
+
+    def apart(self, scene: SceneEchoes) -> tuple[SingleEchoes, list[FactorizedSpreader]]:
+        """The sum over the scatterers that are added pulse by pulse, and what adds the others; see ChannelEchoes."""
+        channel, by_levels = self.channel(scene).apart()
+        rest = SingleEchoes(self.rows)
+        rest._channel = channel
+        return rest, by_levels
 
     def fill(self, scene: SceneEchoes, samples: np.ndarray, start: int, done: int, total: int) -> Added:
         """Add echoes to samples (n, n_polarizations, n_samples), zeros so far, from pulse `start` on.

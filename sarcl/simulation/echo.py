@@ -26,7 +26,7 @@ def echo(scene: Scene, waveform: Waveform, track: Trajectory, options: EchoOptio
 
     Antennas rest while a pulse is on its way (stop and go), except on tracks of `Orbit.trajectory`: there the receiver
     is where it is when the echo of the reference point arrives, on the rotating Earth. report.plan says which, and how
-    much stop and go leaves out (docs/guide/orbits.md).
+    much stop and go leaves out (docs/theory/orbits.md).
 
     Returns a PhaseHistory. ToleranceUnreachable, a ValueError: a tolerance that cannot be met, with the best that can,
     before the work starts. ToleranceMissed, a ValueError that holds the finished echoes: the check measured more than

@@ -113,7 +113,7 @@ def _exact(part: Points | FacetSet, view: ChannelView, p: int) -> tuple[np.ndarr
     antennas, frequencies, polarizations = view.antennas, view.frequencies, view.polarizations
     if isinstance(part, FacetSet):
         return facet_samples(part, view, p, inside_window(part, antennas, p), _light(part, antennas, p, frequencies))
-    from ..reference.echo import echo as exact_echo
+    from ..reference.equations import point_echo as exact_echo
 
     tx, rx, places = antennas.tx[p], antennas.rx[p], part.positions
     away = np.linalg.norm(places - tx, axis=1), np.linalg.norm(places - rx, axis=1)

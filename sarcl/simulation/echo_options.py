@@ -14,6 +14,7 @@ from .scene_options import SceneOptions
 Skip = Literal[
     "zero reflectivity", "facing away", "range window", "out of beam", "equal channels", "interpolated channels"
 ]
+METHODS = ("auto", "direct", "factorized")
 CHANNELS = ("simultaneous", "separated")
 RECEIVE = ("reference", "own", "all")
 SKIPS = ("zero reflectivity", "facing away", "range window", "out of beam", "equal channels", "interpolated channels")
@@ -23,6 +24,12 @@ SKIPS = ("zero reflectivity", "facing away", "range window", "out of beam", "equ
 class EchoOptions(SceneOptions):
     """Options of `echo`."""
 
+    method: Literal["auto", "direct", "factorized"] = option(
+        "auto",
+        '"direct": every pair of scatterer and pulse that is not skipped; "factorized": points are spread at few '
+        'antenna positions about small cells, which are joined level by level; facets directly; "auto": the cheapest',
+        lambda name, value: choice(name, value, METHODS),
+    )
     channels: Literal["simultaneous", "separated"] = option(
         "simultaneous",
         '"simultaneous": all channels of the array are added up, each after its own matched filter, a row for every '

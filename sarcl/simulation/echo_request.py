@@ -38,6 +38,7 @@ class EchoRequest:
     """What is asked for, of every channel alike.
 
     tolerance  of each channel;  vertical  (3,);  budget  bytes on the device;  host  bytes for facets that are cut
+    method     by which points are added: "direct", "factorized" or "auto"
     """
 
     device: Device
@@ -53,6 +54,7 @@ class EchoRequest:
     progress: Progress | None
     clock: Clock = field(default_factory=Clock)
     limits: EchoLimits = EchoLimits()
+    method: str = "direct"
 
     @classmethod
     def of(cls, options: SceneOptions, scene: Scene) -> EchoRequest:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -43,7 +43,7 @@ class EchoTask:
 def echo_task(scene: Scene, waveform: Waveform, track: Trajectory, options: EchoOptions) -> EchoTask:
     """The task of these arguments; opens the device."""
     check_subjects(scene, waveform, track)
-    request = EchoRequest.of(options, scene)
+    request = replace(EchoRequest.of(options, scene), method=options.method)
     point = scene.center if options.reference is None else np.asarray(options.reference)
     sends, hears, motion = echo_sampling.in_flight(track, options.receiver, scene, point)
     echo_sampling.receiver_positions(sends, hears)

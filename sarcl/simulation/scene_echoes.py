@@ -12,7 +12,6 @@ import numpy as np
 from ..base.errors import NothingSeen, ToleranceUnreachable
 from ..base.report import SMALLER_TOLERANCE, ErrorTerm, root_sum_square
 from ..model.waveform import Waveform
-from ..numerics.plan import Plan
 from ..numerics.polynomials import chebyshev
 from ..numerics.pulse_geometry import PulseGeometry
 from ..scattering.antenna_weights import AntennaWeights, WeightError
@@ -21,11 +20,13 @@ from ..scattering.scatterers import Points
 from ..scattering.subdivision import Subdivision
 from ._exact_facets import ExactFacets
 from ._facet_spreading import FacetSpreader, TiledFacets
-from ._point_spreading import PointSpreader
 from ._unseen_scene import OUTSIDE_BEAM, OUTSIDE_WINDOW
 from .echo_request import EchoRequest
+from .points.direct import PointSpreader
+from .points.factorized import FactorizedSpreader
+from .points.point_plan import PointPlan, PreparedPoints
 from .scene_plan import NODES
-from .spreading import Band, ChannelView, Counts, TiledScatterers
+from .spreading import Band, ChannelView, Counts
 
 UNKNOWN_SHADOWS = {"shadow edges": "sampled, not part of the error"}  # for the report
 
@@ -36,8 +37,8 @@ class SceneEchoes:
 
     weights, weight_error  of antennas and distances, and their errors
     subdivision            how facets were cut, None where there are none
-    points, facets         None where none are left;  tiled_points, tiled_facets  the same on the device, partly lit
-                           facets apart from the others
+    points, facets         None where none are left;  prepared_points, tiled_facets  the same as channels plan them:
+                           facets on the device, partly lit ones apart from the others
     skipped                pairs of scatterer and pulse that were left out: reason -> count
     mesh_warnings          what a report says of meshes that are too coarse
     error_budget           the share of the tolerance that points have, and facets
@@ -50,7 +51,7 @@ class SceneEchoes:
     subdivision: Subdivision | None
     points: Points | None
     facets: FacetSet | None
-    tiled_points: TiledScatterers | None
+    prepared_points: PreparedPoints | None
     tiled_facets: tuple[TiledFacets, ...]
     skipped: dict[str, int]
     mesh_warnings: dict[str, Any]
@@ -91,7 +92,7 @@ class SceneEchoes:
             TiledFacets(self.request, part, self.subdivision.plan, antennas, waveform, self.weights)
             for part in changing.split()
         )
-        alone = replace(self, points=None, facets=changing, tiled_points=None, tiled_facets=tiled, shadow_terms=())
+        alone = replace(self, points=None, facets=changing, prepared_points=None, tiled_facets=tiled, shadow_terms=())
         return steady, alone
 
     def channel(
@@ -108,8 +109,8 @@ class SceneEchoes:
         """ToleranceUnreachable where scatterers lie so evenly that samples of a band cannot meet the tolerance."""
         with self._unreachable_for_the_caller():
             for band in bands:
-                if self.tiled_points is not None:
-                    self._plan_points(self.tiled_points, antennas, band)
+                if self.prepared_points is not None:
+                    self._plan_points(self.prepared_points, antennas, band)
                 for tiled in self.tiled_facets:
                     left = self.error_budget / self.gain - tiled.facet_plan.predicted_error
                     tiled.plan(antennas, band, left, least_tolerance=0.0)
@@ -122,7 +123,7 @@ class SceneEchoes:
         except ToleranceUnreachable as refused:
             raise refused.restated(self.request.tolerance, None, "take a larger tolerance") from None
 
-    def _plan_points(self, points: TiledScatterers, antennas: PulseGeometry, band: Band) -> tuple[Plan, float]:
+    def _plan_points(self, points: PreparedPoints, antennas: PulseGeometry, band: Band) -> tuple[PointPlan, float]:
         """The plan of points, and the error of their weights over the band."""
         error = self.weight_error.of(self.n_nodes, self.error_budget)
         return points.plan(antennas, band, self.error_budget - error), error
@@ -140,18 +141,16 @@ class SceneEchoes:
         view = ChannelView(
             antennas, weights, frequencies, waveform.bandwidth, request.polarizations, request.vertical, request.gated
         )
-        points = None
+        points: tuple[PointSpreader | FactorizedSpreader, ...] = ()
         parts: list[tuple[ErrorTerm, dict[str, Any]]] = []
         spreaders: list[FacetSpreader | ExactFacets] = []
         stop = first + len(antennas)
-        if self.points is not None and self.tiled_points is not None and request.same:
+        if self.points is not None and self.prepared_points is not None and request.same:
             nodes = chebyshev(waveform.center, waveform.bandwidth, self.n_nodes)
-            plan, error = self._plan_points(self.tiled_points, antennas, view.band)
+            plan, error = self._plan_points(self.prepared_points, antennas, view.band)
             tolerance = self.error_budget - error
-            points = PointSpreader(self.tiled_points, plan, view, nodes, tolerance, request.budget)
-            parts.append(
-                (ErrorTerm("points", plan.predicted_error + error, SMALLER_TOLERANCE), plan.describe("spread"))
-            )
+            points = tuple(plan.spreaders(request.device, self.points, view, nodes, tolerance, request.budget))
+            parts.append((ErrorTerm("points", plan.predicted_error + error, SMALLER_TOLERANCE), plan.describe()))
         if self.facets is not None and self.subdivision is not None and self.subdivision.plan.is_float64:
             facets = self.facets if stop - first == self.n_pulses else self.facets.between(first, stop)
             exact = ExactFacets(facets, self.subdivision.plan, view)
@@ -201,12 +200,12 @@ class SceneEchoes:
 class ChannelEchoes:
     """The echoes of a scene in one channel at one receiver, as they are planned.
 
-    points           spreader of points, None where there are none;  spreaders  of facets
+    points, spreaders  spreaders of points and of facets
     error_terms      relative, of the channel;  plan  in words, of its part with the largest error
     """
 
     scene: SceneEchoes
-    points: PointSpreader | None
+    points: tuple[PointSpreader | FactorizedSpreader, ...]
     spreaders: tuple[FacetSpreader | ExactFacets, ...]
     error_terms: tuple[ErrorTerm, ...]
     plan: dict[str, Any]
@@ -215,6 +214,11 @@ class ChannelEchoes:
     def predicted_error(self) -> float:
         """Relative error of the channel."""
         return root_sum_square(self.error_terms)
+
+    def apart(self) -> tuple[ChannelEchoes, list[FactorizedSpreader]]:
+        """The echoes that are added pulse by pulse, and what adds the others, by levels for the whole track."""
+        by_levels = [spreader for spreader in self.points if isinstance(spreader, FactorizedSpreader)]
+        return replace(self, points=tuple(one for one in self.points if isinstance(one, PointSpreader))), by_levels
 
     def add(self, samples: np.ndarray, pulses: Sequence[int], done: int, total: int) -> Counts:
         """Add sum_k a_k exp(-j 2 pi f (tau_k - tau_ref)) to samples (n, n_polarizations, n_samples), zeros so far.
@@ -227,8 +231,9 @@ class ChannelEchoes:
             request.report("echo", done + counts.pairs + n, total)
 
         on_progress(0)
-        if self.points is not None:
-            counts = self.points.add(samples[:, request.same[0]], pulses, request.clock, on_progress)
+        if self.points:
+            for points in self.points:
+                counts += points.add(samples[:, request.same[0]], pulses, request.clock, on_progress)
             samples[:, request.same[1:]] = samples[:, request.same[:1]]
         elif scene.points is not None:  # in these polarisations points send nothing back
             counts = Counts(len(scene.points) * len(samples))

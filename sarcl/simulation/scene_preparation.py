@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from ..base.errors import NothingSeen, ToleranceUnreachable, warn
+from ..base.errors import NotApplicable, NothingSeen, ToleranceUnreachable, warn
 from ..base.report import ErrorTerm
 from ..base.tolerances import askable, rounded_up
 from ..scattering.antenna_weights import AntennaWeights
@@ -15,11 +15,10 @@ from ..scattering.scatterers import Points, ShadowRule, facets_of, points_of
 from ..scattering.subdivision import Subdivision
 from ..scene.scene import Scene
 from ._facet_spreading import TiledFacets
-from ._point_spreading import tiled_points
 from .echo_request import EchoRequest
+from .points.point_plan import PreparedPoints
 from .scene_echoes import SceneEchoes
 from .scene_plan import SHADOWS, ScenePlan, parts_of, samples_shadows
-from .spreading import TiledScatterers
 
 LEAST = 1e-30  # largest amplitude of a scene below which echoes approach the smallest numbers of complex64
 LARGEST = 1e30  # amplitude whose sums and spectra still fit in complex64
@@ -74,7 +73,7 @@ def prepare_scene(plan: ScenePlan, *, tiled: bool = True, exact: bool = True) ->
         subdivision=subdivision,
         points=points,
         facets=facets,
-        tiled_points=_tiled_points(plan, points, weights) if tiled else None,
+        prepared_points=_prepared_points(plan, points, weights) if tiled else None,
         tiled_facets=_tiled_facets(plan, subdivision, facets, weights) if tiled else (),
         skipped=skipped,
         mesh_warnings=mesh_warnings,
@@ -99,11 +98,14 @@ def _check_left(request: EchoRequest, points: Points | None, facets: FacetSet | 
         raise NothingSeen(f"nothing is left to reflect: {reasons}; move the track or the scene")
 
 
-def _tiled_points(plan: ScenePlan, points: Points | None, weights: AntennaWeights) -> TiledScatterers | None:
-    """Points in tiles on the device, where any send something back."""
-    if points is None or not plan.request.same:
+def _prepared_points(plan: ScenePlan, points: Points | None, weights: AntennaWeights) -> PreparedPoints | None:
+    """Points with what the plans of all channels share, where any send something back."""
+    request, seen = plan.request, plan.seen
+    if request.method == "factorized" and (points is None or not request.same):
+        raise NotApplicable('method="factorized" is for points, and the scene sends back echoes of facets alone')
+    if points is None or not request.same:
         return None
-    return tiled_points(plan.request.device, points, plan.seen.antennas, plan.seen.waveform, weights)
+    return PreparedPoints(request.device, points, seen.antennas, seen.waveform, weights, request.method)
 
 
 def _tiled_facets(

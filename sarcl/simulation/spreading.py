@@ -19,7 +19,7 @@ from ..numerics.pulse_geometry import PulseGeometry
 from ..numerics.tiles import Tiles, tile_points
 from ..opencl.device import Device
 from ..scattering.antenna_weights import AntennaWeights
-from ._kernel_images import PatchSamples
+from .kernel_images import PatchSamples
 
 PER_TILE = (256, 64)
 GROUP = 64  # work-items that add up a row together: ITEMS of kernels/spread_group.clh

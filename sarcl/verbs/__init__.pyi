@@ -36,6 +36,7 @@ HOMES: dict[str, str]
 class EchoKeywords(TypedDict, total=False):
     """Options of `echo`, for functions that hand them on."""
 
+    method: Literal["auto", "direct", "factorized"]
     channels: Literal["simultaneous", "separated"]
     receive: Literal["reference", "own", "all"]
     skip: bool | Collection[EchoSkip]
@@ -162,6 +163,7 @@ def echo(
     waveform: Waveform,
     track: Trajectory,
     *,
+    method: Literal["auto", "direct", "factorized"] = "auto",
     channels: Literal["simultaneous", "separated"] = "simultaneous",
     receive: Literal["reference", "own", "all"] = "reference",
     skip: bool | Collection[EchoSkip] = True,

@@ -22,5 +22,3 @@ For this folder alone:
     _ray_casting           occlusion by facets, from anywhere: by a light buffer, or rays through a tree of boxes
     _viewpoints            which pulses and facets are looked at, for an error between them
 """
-
-__all__ = ["illumination", "lit_parts", "rays"]

@@ -11,7 +11,7 @@ from ._facet_samples import FEWEST_LINES
 from ._illumination_solver import IlluminationSolver, Look
 from ._viewpoints import PartialLook, between_levels, refine_viewpoints
 
-SAMPLING = 0.5  # of the error of amplitudes: share of counting samples, beside that of looks at some pulses alone
+SAMPLING = 0.375  # of the error of amplitudes: share of counting samples, beside that of looks at some pulses alone
 # Of the square of the accuracy: what both errors may take while those of samples are not known of all pulses, and the
 # least that is left to looks at some pulses alone
 MARGIN, LEAST = 0.95, 0.1

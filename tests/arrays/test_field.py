@@ -12,7 +12,7 @@ import sarcl
 from sarcl.arrays._beam_plan import blocks, make_plan
 from sarcl.model.antenna_array import AntennaArray
 from sarcl.opencl.device import Device
-from sarcl.reference.field import field
+from sarcl.reference.equations import field
 
 C = 299_792_458.0
 F0 = 10e9

@@ -358,7 +358,7 @@ def test_the_page_is_made_from_the_files(tmp_path):
     readme = tmp_path / "README.md"
     readme.write_text("before\n<!-- results -->\nold\n<!-- end of results -->\nafter\n")
     written = page.write(results, docs, readme)
-    assert [p.name for p in written] == ["results-a.png", "results.md", "README.md"]
+    assert [p.name for p in written] == ["results-a.png", "results.md", "results_echoes.md", "README.md"]
     text = (docs / "results.md").read_text()
     for words in ("results-a.png", "1.5e-03", "3.00 x", "not here", "cost against size", "taps 2"):
         assert words in text
@@ -426,7 +426,7 @@ def test_echo_documents_become_tables(tmp_path):
     (tmp_path / "results").mkdir()
     backproject.write(document, tmp_path / "results" / "2-echo.json")
     page.write(tmp_path / "results", tmp_path)
-    text = (tmp_path / "results.md").read_text()
+    text = (tmp_path / "results_echoes.md").read_text()
     assert "| sarcl, delays from geometry | 1e-03 | 2.0e-04 | 0.4 | 100 | 80 | 50 |" in text
     assert "| 1e-03 complex64 | 7.0e-04 | 1e-03 | 2.0e-04 | 2.50 x | 2.40 x |" in text
     assert "| metal | 1e-02 | 1.0e-03 | 8.0e-03 | 2 | 2.0 | 0.05 x its rate |" in text
@@ -446,7 +446,7 @@ def test_documents_of_channels_become_tables(tmp_path):
     (tmp_path / "results").mkdir()
     backproject.write(document, tmp_path / "results" / "4-channels.json")
     page.write(tmp_path / "results", tmp_path)
-    text = (tmp_path / "results.md").read_text()
+    text = (tmp_path / "results_echoes.md").read_text()
     assert "| points | 45 | one call, 3 positions | 2.0e-05 | 8.0e-04 | 2 | 3 | 4.5 | 1.00 |" in text
     assert "| points | 45 | one call per channel | 2.0e-05 | 8.0e-04 | 7 | 8 | 1.29 | 3.50 |" in text
     assert "Carriers of 900 MHz in all x 101 pulses" in text and "One carrier" not in text
@@ -468,7 +468,7 @@ def test_documents_of_full_wave_runs_become_tables(tmp_path):
     (tmp_path / "results").mkdir()
     backproject.write(document, tmp_path / "results" / "6-full-wave.json")
     page.write(tmp_path / "results", tmp_path)
-    text = (tmp_path / "results.md").read_text()
+    text = (tmp_path / "results_echoes.md").read_text()
     assert "200 x 200 x 208 cells, 50 frequencies; 18% of the cells" in text and "- peer gprMax 4.0.1" in text
     assert "| gprMax OpenMP | 150 | 125 | 3.0 | 4.0 |" in text
 
@@ -489,7 +489,7 @@ def test_documents_of_a_spaceborne_pass_become_tables(tmp_path):
     (tmp_path / "results").mkdir()
     backproject.write(document, tmp_path / "results" / "5-spaceborne.json")
     page.write(tmp_path / "results", tmp_path)
-    text = (tmp_path / "results.md").read_text()
+    text = (tmp_path / "results_echoes.md").read_text()
     assert "5 x 1.5 km of ground in 2,400,000 facets" in text and "4 x 5 pixels by range-Doppler and 6 x 7" in text
     assert "| raw data | 155.4 | 2.3e-03 |" in text and "| backprojection | 17.0 |  |" in text
     assert "| width, m | 2.20 | 2.21 | 2.19 |" in text and "| rate | -1848.0 | -1848.3 |  |" in text

@@ -9,6 +9,7 @@ import pytest
 from helpers.cases import image_error, noise_on, straight
 
 import sarcl
+from sarcl.base.tolerances import reachable
 from sarcl.imaging import choose_method
 from sarcl.reference.polar_format import polar_format as plane_waves
 
@@ -238,8 +239,8 @@ def test_a_tolerance_that_cannot_be_asked_for_is_not_named_as_the_best():
 
         return plan
 
-    assert choose_method._search(needs(0.4), 0.02) is None  # 0.46 was named for sub-apertures
-    assert 0.22 <= choose_method._search(needs(0.22), 0.02) <= 0.3
+    assert reachable(needs(0.4), 0.02, choose_method.STEP_OF_SEARCH) is None  # 0.46 was named for sub-apertures
+    assert 0.22 <= reachable(needs(0.22), 0.02, choose_method.STEP_OF_SEARCH) <= 0.3
 
 
 def test_refusals_without_a_best_tolerance_have_a_remedy(device):

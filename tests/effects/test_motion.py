@@ -13,7 +13,7 @@ import sarcl
 from sarcl import motion, pointing
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.effects import stop_and_go
-from sarcl.reference.echo import echo as exact
+from sarcl.reference.equations import point_echo as exact
 
 FC = 9.6e9
 WAVE = SPEED_OF_LIGHT / FC

@@ -133,11 +133,3 @@ def test_few_pulses_become_anchors_all():
     got = anchored(lambda pulse: formed[some[pulse]][some], along[some], tolerance=1e-9)
     assert got.pulses.tolist() == list(range(5))
     assert error(got.samples, own[some]) < 1e-6
-
-
-def test_progress_counts_anchors():
-    _, along, formed, _ = case(201)
-    seen = []
-    got = anchored(lambda pulse: formed[pulse], along, progress=lambda *report: seen.append(report))
-    assert [done for _, done, _ in seen] == list(range(1, len(got.pulses) + 1))
-    assert all(stage == "anchors" and done <= total for stage, done, total in seen)

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from helpers.current_cases import antennas, difference, random_currents, twin, unit
 from helpers.devices import as_gpu
+from helpers.far_field import amplitude
 
 from sarcl.fullwave import dispersion
 from sarcl.fullwave.current_sums import BENT, GROUP, PATHS, current_sums
 from sarcl.fullwave.currents import Currents
-from sarcl.fullwave.far_field import amplitude
 from sarcl.fullwave.formed_echoes import formed_echoes, paths_of
 from sarcl.fullwave.incident import PlaneWave
 from sarcl.opencl.device import Device

@@ -14,7 +14,7 @@ from sarcl.fullwave.incident import PlaneWave, wave_table
 from sarcl.fullwave.lattice import COURANT, Lattice, lattice_around
 from sarcl.fullwave.pulse import Pulse
 from sarcl.fullwave.target import Target, material_edges
-from sarcl.reference import fdtd
+from sarcl.reference import equations
 
 CELL = 0.01  # m
 DIRECTIONS = [(0, 0, -1.0), (0.6, 0.8, 0), (0.36, -0.48, 0.8), (-1, 1, 1)]
@@ -39,10 +39,10 @@ def test_a_plane_wave_of_the_grid_solves_its_update_equations(direction, cells):
         return np.cos(phase).reshape(3, *grid.shape) * units[magnetic][0][:, None, None, None]
 
     e, h = wave(0, 0), wave(1, 0.5)
-    fdtd.update_e(e, h, COURANT)
+    equations.update_e(e, h, COURANT)
     inner = (slice(None), *[slice(1, -1)] * 3)
     assert np.abs(e - wave(0, 1))[inner].max() < 1e-13
-    fdtd.update_h(e, h, COURANT)
+    equations.update_h(e, h, COURANT)
     assert np.abs(h - wave(1, 1.5))[inner].max() < 1e-13
 
 
@@ -175,7 +175,7 @@ def test_the_absorbing_layers_reflect_less_than_one_part_in_a_thousand(param):
         near = [np.arange(n) - n // 2 for n in grid.shape]
         x, y, z = np.meshgrid(*near, indexing="ij")
         bump = np.exp(-(x**2 + y**2 + z**2) / 8.0)  # a ring of E without divergence
-        start[0], start[1] = fdtd.before(bump, 1), -fdtd.before(bump, 0)
+        start[0], start[1] = equations.before(bump, 1), -equations.before(bump, 0)
         run.start(start, np.zeros_like(start))
         for _ in range(15):
             run.advance(BLOCK)

@@ -9,6 +9,7 @@ import numpy as np
 import pyopencl
 import pytest
 from helpers.devices import opened, variants
+from helpers.far_field import amplitude
 from helpers.fdtd_cases import random_target, sphere_intervals
 
 from sarcl import shapes
@@ -16,7 +17,6 @@ from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.fullwave.bodies.cut_cells import conductor
 from sarcl.fullwave.bodies.mesh_lines import mesh_lines
 from sarcl.fullwave.currents import Decay, box_of, currents, sample_period
-from sarcl.fullwave.far_field import amplitude
 from sarcl.fullwave.fields import BLOCK, SAMPLES, Fields
 from sarcl.fullwave.incident import PlaneWave, wave_table
 from sarcl.fullwave.lattice import Lattice

@@ -17,7 +17,7 @@ from sarcl.fullwave.bodies.mesh_lines import mesh_lines
 from sarcl.fullwave.fields import BLOCK, Fields
 from sarcl.fullwave.lattice import COURANT, Lattice
 from sarcl.fullwave.target import VACUUM_PERMITTIVITY, Target, material_edges
-from sarcl.reference import fdtd
+from sarcl.reference import equations
 from sarcl.scene.triangles import rotation
 
 CELL = 0.01  # m
@@ -58,8 +58,8 @@ def fastest(length, area):
     h = np.random.default_rng(5).uniform(-1, 1, length.shape) * (area > 0)
     for _ in range(50):
         e, curl = np.zeros_like(h), np.zeros_like(h)
-        fdtd.update_e(e, h, 1)
-        fdtd.update_h(e * length, curl, -1)
+        equations.update_e(e, h, 1)
+        equations.update_h(e * length, curl, -1)
         h = np.divide(curl, area, out=np.zeros_like(h), where=area > 0)
         size = np.linalg.norm(h)
         h /= size
@@ -125,8 +125,8 @@ def test_a_dielectric_that_fills_the_cavity_slows_waves_by_the_root_of_its_permi
     for _ in range(5):
         fields.advance(BLOCK)
     for _ in range(5 * BLOCK):
-        fdtd.update_h(slow_e, slow_h, COURANT / 2)
-        fdtd.update_e(slow_e, slow_h, COURANT / 2)
+        equations.update_h(slow_e, slow_h, COURANT / 2)
+        equations.update_e(slow_e, slow_h, COURANT / 2)
     # H of the dielectric begins at H and follows -s curl E; in units of 1/sqrt(eps) it is H/2 and follows -(s/2) curl E
     got_e, got_h = fields.download()
     assert np.abs(got_e - slow_e).max() < 2e-5

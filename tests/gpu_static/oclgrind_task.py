@@ -39,7 +39,7 @@ from sarcl.opencl import device as device_module
 from sarcl.opencl.choose_device import open_device
 from sarcl.opencl.device import Device
 from sarcl.reference import fdtd
-from sarcl.reference.field import field
+from sarcl.reference.equations import field
 
 PLANE = sarcl.ImageGrid.plane(center=(0, 0, 0), spacing=0.2, shape=(17, 19))
 CHIRP = sarcl.Waveform.chirp(center=9.6e9, bandwidth=300e6, duration=1e-6)

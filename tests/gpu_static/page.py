@@ -1,4 +1,4 @@
-"""The tables of docs/developers/gpu_static.md, from recorded figures."""
+"""The tables of docs/developers/gpu_static.md and of tests/gpu_static/variants.md, from recorded figures."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from gpu_static.hot_loops import HOT
 from gpu_static.ratchet import NOT_ON_GPUS
 
 PAGE = ROOT / "docs" / "developers" / "gpu_static.md"
+VARIANTS = ROOT / "tests" / "gpu_static" / "variants.md"  # a table per kernel, too long for a page of the docs
 BEGIN, END = "<!-- tables: begin, made by `make gpu-static ARGS=--record` -->", "<!-- tables: end -->"
 SHOWN = "TAPS", "LINE_TAPS", "SLOPE_TAPS", "FINE", "RANGE", "FP64"  # macros by which the first table names programs
 # H200, inferred: 132 multiprocessors that issue to 4 x 32 lanes at 1.86 GHz, and pass wavefronts at 1.75 GHz.
@@ -30,7 +31,12 @@ PLAIN = {"BEAM": "0", "BISTATIC": "0", "FP64": "1", "LOCAL": "0", "ORDER": "2", 
 def tables(record: dict[str, Any]) -> str:
     """The generated part of the page."""
     tools = ", ".join(f"{name} {version}" for name, version in record["tools"].items())
-    return "\n".join([BEGIN, f"\nMade by {tools}.\n", *_first(record), *_left_out(), *_files(record), END])
+    return "\n".join([BEGIN, f"\nMade by {tools}.\n", *_first(record), *_left_out(), END])
+
+
+def variants(record: dict[str, Any]) -> str:
+    """The file of all kernels and variants."""
+    return "\n".join(_files(record))
 
 
 def written(text: str, record: dict[str, Any]) -> str:
@@ -117,7 +123,9 @@ def _files(record: dict[str, Any]) -> list[str]:
         for kernel in kernels:
             by_kernel[name.split()[0], kernel].append(name)
     out = [
-        "## Every kernel and variant\n",
+        "# Every kernel and variant\n",
+        "Written by `make gpu-static ARGS=--record`; "
+        "[how it is counted](../../docs/developers/gpu_static.md#how-instructions-are-counted).\n",
         "Registers of sm_80 / sm_90; vector registers and waves per SIMD of gfx90a / gfx1100. Local memory, B per "
         "group, and occupancy are those of sm_90, the latter for groups as launched, or of 256 where the driver "
         "chooses. "
@@ -130,7 +138,7 @@ def _files(record: dict[str, Any]) -> list[str]:
         same = " ".join(f"{k}={v}" for k, v in macros[names[0]].items() if k not in differ)
         unit = f"per {hot.unit}" if hot else "per trip of the largest innermost loop, or per work-item without loops"
         out += [
-            f"### {file}: {kernel}\n",
+            f"## {file}: {kernel}\n",
             f"Instructions {unit}.{f' All with {same}.' if same else ''}\n",
             f"| {', '.join(differ) or 'variant'} | registers | local | occupancy | instructions | loads "
             "| AMD registers | AMD waves |",

@@ -1,7 +1,7 @@
 """What compilers say of the kernels on GPUs, without a GPU.
 
     python tests/gpu_static/run.py             compile every program that plans build for GPUs, and compare figures
-    python tests/gpu_static/run.py --record    the same, and write figures.json and the tables of the page
+    python tests/gpu_static/run.py --record    the same, and write figures.json, variants.md and the tables of the page
     python tests/gpu_static/run.py --count FILE [MACRO=VALUE ...]    count one program: figures of every target, loops
     options: --text PATH (source text to compile in place of kernels/FILE), --keep FOLDER (PTX, cubin, listing)
 
@@ -72,6 +72,7 @@ def compare(record: bool) -> int:
         now = {"tools": compilers.versions(), "first": figures.first(), "figures": found}
         ratchet.RECORD.write_text(ratchet.text_of(now))
         page.PAGE.write_text(page.written(page.PAGE.read_text(), now))
+        page.VARIANTS.write_text(page.variants(now))
         gone = sorted(set(before["figures"]) - set(found))
         print(f"recorded {len(found)} programs, {len(set(found) - set(before['figures']))} new, {len(gone)} gone")
     elif before["tools"] == compilers.versions():
@@ -91,7 +92,7 @@ def compare(record: bool) -> int:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--record", action="store_true", help="write figures.json and the page's tables")
+    parser.add_argument("--record", action="store_true", help="write figures.json, variants.md and the page's tables")
     parser.add_argument("--count", nargs="+", metavar=("FILE", "MACRO=VALUE"), help="count one program")
     parser.add_argument("--text", type=Path, help="source text to compile in place of kernels/FILE, #include expanded")
     parser.add_argument("--keep", type=Path, help="folder for PTX, machine code and nvdisasm's listing")

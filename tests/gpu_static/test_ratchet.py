@@ -71,6 +71,7 @@ def test_the_record_is_json_and_is_what_the_page_shows():
     assert ratchet.RECORD.read_text() == ratchet.text_of(record)
     text = page.PAGE.read_text()
     assert page.written(text, record) == text, "type: make gpu-static ARGS=--record"
+    assert page.VARIANTS.read_text() == page.variants(record), "type: make gpu-static ARGS=--record"
     assert ratchet.limits(record["figures"]) == ratchet.coverage(record["figures"]) == []
 
 

@@ -9,7 +9,7 @@ from sarcl.fullwave.currents import Currents
 from sarcl.fullwave.incident import PlaneWave
 from sarcl.fullwave.lattice import Lattice
 from sarcl.fullwave.pulse import Pulse
-from sarcl.reference import formed_echo
+from sarcl.reference import equations
 
 CELL = 0.02  # m
 RANGE = 1.1e3  # m
@@ -48,7 +48,7 @@ def twin(currents, paths, tx, rx):
         offset = currents.lattice.positions(at, bool(magnetic)) - currents.centre
         for component in range(3):
             own = at // size == component
-            out.append(formed_echo.current_sums(
+            out.append(equations.current_sums(
                 offset[own], values[:, own], currents.wave.travel, paths.sent, paths.received, tx - currents.centre,
                 rx - currents.centre,
             ))  # fmt: skip

@@ -11,7 +11,7 @@ import numpy as np
 
 import sarcl
 from sarcl.reference.compress import compress as exact_compress
-from sarcl.reference.echo import echo as exact_echo
+from sarcl.reference.equations import point_echo as exact_echo
 from sarcl.reference.geometry import half_path
 
 from . import task_inputs as inputs

@@ -12,7 +12,7 @@ from sarcl.fullwave.bodies.cut_cells import Intervals
 from sarcl.fullwave.incident import entrances
 from sarcl.fullwave.lattice import COURANT, lattice_around
 from sarcl.fullwave.target import Target
-from sarcl.reference import fdtd
+from sarcl.reference import equations, fdtd
 
 
 def sphere_intervals(lattice, centre, radius):
@@ -36,7 +36,7 @@ def conductor_on_grid(triangles, cell):
 
 
 class Twin:
-    """What Fields does, by sarcl/reference/fdtd.py: fields e and h, and the residuals of each step."""
+    """What Fields does, by sarcl/reference/equations.py and fdtd.py: fields e and h, and the residuals of each step."""
 
     def __init__(self, lattice, target, e, h, absorber=0, wave=None):
         self.lattice, self.target, self.wave, self.step = lattice, target, wave, 0
@@ -56,10 +56,10 @@ class Twin:
 
     def advance(self):
         """One step: the residuals of edges and of faces."""
-        fdtd.update_h(self.e, self.h, COURANT)
+        equations.update_h(self.e, self.h, COURANT)
         self._correct(self.h, self.e, magnetic=1)
         faces = fdtd.faces(self.e, self.h, self.target.faces, self.target.weight, self.old[1], COURANT)
-        fdtd.update_e(self.e, self.h, COURANT)
+        equations.update_e(self.e, self.h, COURANT)
         self._correct(self.e, self.h, magnetic=0)
         edges = fdtd.edges(self.e, self.target.edges, self.target.share, self.old[0])
         if len(self.target.coupled):

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 import sarcl
-from sarcl.reference.field import field as exact_field
+from sarcl.reference.equations import field as exact_field
 from sarcl.scenario.scenario import Scenario, loads
 
 from . import task_inputs as inputs

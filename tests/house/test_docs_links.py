@@ -51,6 +51,11 @@ def broken(page: Path, root: Path) -> list[str]:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_no_page_has_more_than_300_lines(page):
+    assert len(page.read_text().splitlines()) <= 300, "make two pages of it, or a file of its tables"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: str(p.relative_to(ROOT)))
 def test_every_relative_link_and_anchor_resolves(page):
     assert broken(page, ROOT) == []
 

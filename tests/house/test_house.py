@@ -210,7 +210,7 @@ def wheel(tmp_path_factory):
 
 
 def test_every_module_and_kernel_is_in_the_wheel(wheel):
-    kinds = ".py", ".pyi", ".typed", ".cl", ".clh", ".j2"
+    kinds = ".py", ".pyi", ".typed", ".cl", ".clh", ".j2", ".json", ".toml"
     wanted = {p for p in tree(*kinds) if p.startswith("sarcl/")}
     wanted |= {f"sarcl/{p}" for p in tree(*kinds) if p.startswith("kernels/")}
     assert {p.relative_to(wheel).as_posix() for p in wheel.rglob("*") if p.suffix in kinds} == wanted

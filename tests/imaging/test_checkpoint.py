@@ -28,8 +28,8 @@ from sarcl.imaging.choose_method import choose
 from sarcl.imaging.engine import Skipped
 from sarcl.imaging.focusing_task import make_task
 from sarcl.imaging.run import checkpoint, tile_files
-from sarcl.imaging.run._fingerprint import job, mark
 from sarcl.imaging.run.image_output import BandBuffer, ImageOutput
+from sarcl.imaging.run.tile_files import job_of, mark
 from sarcl.io import output_paths
 
 GRID = sarcl.ImageGrid.plane(center=(1, 2, 0), shape=(700, 301), spacing=(0.03, 0.02))
@@ -194,7 +194,7 @@ def bands(raw):
 def found(raw, path):
     """Runs of bands in the files beside an image, read and checked."""
     task, chosen = make_task(raw, GRID, None, None, False, True), planned(raw)
-    described = job(task, chosen.method, 1e-3, chosen.plan, chosen.tiling, chosen.dtype)
+    described = job_of(task, chosen.method, 1e-3, chosen.plan, chosen.tiling, chosen.dtype)
     files = tile_files.TileStore(tile_files.folder_of(path), described, chosen.tiling, chosen.dtype)
     return [run for run, _, _ in files.found(0, chosen.tiling.n_bands)]
 
@@ -531,7 +531,7 @@ def test_every_field_of_a_task_has_its_part_in_the_fingerprint(raw):
     task, chosen = make_task(raw, GRID, None, None, False, True), planned(raw)
 
     def mark_of(task):
-        return mark(job(task, chosen.method, 1e-3, chosen.plan, chosen.tiling, chosen.dtype))
+        return mark(job_of(task, chosen.method, 1e-3, chosen.plan, chosen.tiling, chosen.dtype))
 
     @dataclass(frozen=True, eq=False)
     class More(type(task)):
@@ -547,7 +547,7 @@ def test_every_field_of_a_task_has_its_part_in_the_fingerprint(raw):
         mark_of(More(**known, more=lambda x: x))
 
 
-def test_a_foreign_tile_among_ones_own_is_not_used_and_not_destroyed(raw, whole, tmp_path, caplog):
+def test_a_foreign_tile_among_ones_own_is_not_used(raw, whole, tmp_path, caplog):
     for folder, options in (("a", {}), ("b", {"window": "hamming"})):
         (tmp_path / folder).mkdir()
         half_done(raw, tmp_path / folder / "image.h5", **options)

@@ -10,7 +10,7 @@ import pytest
 from helpers.cases import noise_history
 
 from sarcl.base.constants import SPEED_OF_LIGHT
-from sarcl.imaging.float64._pulse_records import packed
+from sarcl.imaging.float64.direct import packed
 from sarcl.imaging.focusing_task import geometry_of
 from sarcl.numerics import error_bounds, interpolation, interpolator_choice
 from sarcl.opencl import fft, programs

@@ -10,7 +10,7 @@ import pytest
 
 import sarcl
 from sarcl.base.constants import SPEED_OF_LIGHT
-from sarcl.reference.echo import echo as exact_echo
+from sarcl.reference.equations import point_echo as exact_echo
 
 TOLERANCE = {
     "echo": 1e-5,  # asked of both echoes; their difference is at most twice that

@@ -115,7 +115,7 @@ def gpu(**answers):
 
 def test_the_warp_of_a_gpu_is_asked_of_its_driver_and_else_of_the_trials_compiler():
     for known, warp in (({"warp_size_nv": 32}, 32), ({"wavefront_width_amd": 64}, 64), ({}, 0)):
-        assert _queries.facts(gpu(**known)).warp == warp
+        assert _queries.facts(gpu(**known))["warp"] == warp
 
 
 def test_the_place_on_the_bus_is_asked_in_the_three_ways_of_drivers(monkeypatch):
@@ -123,9 +123,9 @@ def test_the_place_on_the_bus_is_asked_in_the_three_ways_of_drivers(monkeypatch)
     amd = gpu(topology_amd=SimpleNamespace(bus=0x41, device=1, function=0))
     khronos = gpu(extensions="cl_khr_fp64 cl_khr_pci_bus_info")
     monkeypatch.setattr(_queries, "raw_info", lambda *question: struct.pack("4I", 0, 0x41, 1, 0))
-    assert [_queries.facts(handle).pci for handle in (nvidia, amd, khronos)] == ["41:01.0"] * 3
+    assert [_queries.facts(handle)["pci"] for handle in (nvidia, amd, khronos)] == ["41:01.0"] * 3
     monkeypatch.setattr(_queries, "raw_info", lambda *question: b"")
-    assert _queries.facts(khronos).pci == _queries.facts(gpu()).pci == ""
+    assert _queries.facts(khronos)["pci"] == _queries.facts(gpu())["pci"] == ""
 
 
 def test_a_question_that_pyopencl_does_not_know_is_asked_of_the_driver_itself():

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import ast
 import json
+import re
+import tomllib
 from dataclasses import replace
+from pathlib import Path
+from string import Formatter
 from xml.etree import ElementTree
 
 import numpy as np
@@ -248,9 +253,10 @@ def test_main_results_are_rows_of_their_papers(quick):
 
 def test_rows_are_judged_by_their_numbers():
     section = Section("key", "title")
-    section.number("a", "table 1", 0.167, 0.168, 0.002, "m")
-    section.number("b", "table 1", 0.167, 0.17, 0.002, "m", why="too wide")
-    section.states("c", "figure 1", "focused", "not", np.False_, value=np.float32(3), rule="below 1")
+    printed = {"source": "table 1", "expected": 0.167, "within": 0.002, "unit": "m"}
+    section.number("a", 0.168, **printed)
+    section.number("b", 0.17, why="too wide", **printed)
+    section.states("c", np.float32(3), np.False_, expected="focused", measured="not", rule="below 1")
     assert [row.holds for row in section.rows] == [True, False, False]
     assert [row.rule for row in section.rows] == ["within 0.002 m", "within 0.002 m", "below 1"]
     assert section.rows[0].expected == "0.167 m" and section.rows[0].measured == "0.168 m"
@@ -261,9 +267,11 @@ def test_rows_are_judged_by_their_numbers():
 
 def test_values_that_the_paper_does_not_print_are_marked_and_not_counted_as_published():
     section = Section("key", "title")
-    section.number("width", "table 1", 0.167, 0.168, 0.002, "m")
-    section.number("shadow", "figure 3", 28.4, 27.9, 1.0, "m", ".1f", basis="geometry")
-    section.states("sphere", "Mie", "exact", "differs by 9 %", False, rule="below 5 %", basis="theory")
+    section.number("width", 0.168, source="table 1", expected=0.167, within=0.002, unit="m")
+    shadow = {"source": "figure 3", "expected": 28.4, "within": 1.0, "unit": "m", "form": ".1f", "basis": "geometry"}
+    section.number("shadow", 27.9, **shadow)
+    exact = {"source": "Mie", "expected": "exact", "rule": "below 5 %", "basis": "theory"}
+    section.states("sphere", None, False, measured="differs by 9 %", **exact)
     page = Page(replace(PAPER, sections=(lambda lab: section,), main=()).html([section], quick=False))
     assert "1 of 1 published values and statements agree" in page.words
     assert "1 of 2 further values, which the paper does not print, agree with geometry or theory:" in page.words
@@ -437,3 +445,56 @@ def test_arrays_of_more_than_a_hundred_elements(tmp_path):
     assert last["separation"] == 0.3 and last["dip_db"] > 20 and last["shift"] > 0.1 and last["false_db"] > -3
     assert row["measured"].startswith("at no separation tried") and "displaced by 0.133 m" in row["why"]
     assert large["finished"] and not large["quick"]
+
+
+def fields_of(texts):
+    """Names in the {} of texts."""
+    return {re.split(r"[.\[]", field)[0] for text in texts for _, field, *_ in Formatter().parse(text) if field}
+
+
+def calls(name, *methods):
+    """Calls of methods of a section in the modules of a paper: first argument, names of the others and of the words of
+    the module's sections."""
+    for file in (Path(papers.__file__).parent / name).glob("*.py"):
+        nodes = list(ast.walk(ast.parse(file.read_text(encoding="utf-8"))))
+        kept = {
+            word.arg
+            for n in nodes
+            if isinstance(n, ast.Call) and ast.unparse(n.func) == "Section.of"
+            for word in n.keywords
+        }
+        kept |= {
+            key.value for n in nodes if isinstance(n, ast.Assign | ast.AugAssign) and isinstance(n.value, ast.Dict)
+            and "out.words" in ast.unparse(n).split("=")[0] for key in n.value.keys
+        }  # fmt: skip
+        for node in nodes:
+            if isinstance(node, ast.Call) and ast.unparse(node.func) in methods:
+                words = kept | {word.arg for word in node.keywords}
+                for word in node.keywords:
+                    if word.arg == "words":
+                        words |= {key.value for key in word.value.keys}
+                yield node.args[0], words
+
+
+@pytest.mark.parametrize("name", papers.PAPERS)
+def test_every_row_and_figure_finds_its_texts_and_the_words_in_them(name):
+    texts = tomllib.loads((Path(papers.__file__).parent / f"{name}.toml").read_text(encoding="utf-8"))
+    sections = [table for key, table in texts.items() if isinstance(table, dict) and key != "terms"]
+    rows = {key: row for table in sections for key, row in table.items() if isinstance(row, dict) and key != "figures"}
+    for node, words in calls(name, "out.states", "out.number"):
+        if not isinstance(node, ast.Constant):  # of a variable
+            continue
+        entry = {"item": node.value, **rows[node.value]}
+        filled = [text for key, text in entry.items() if isinstance(text, str)]
+        assert None in words or fields_of(filled) - {"value"} <= words, node.value
+    folder = Path(papers.__file__).parent / name
+    code = "".join(file.read_text(encoding="utf-8") for file in folder.glob("*.py"))
+    assert not [key for key in rows if f'"{key}"' not in code]
+    figures = [{k: f for k, f in table.get("figures", {}).items()} for table in sections]
+    for node, words in calls(name, "out.plot", "out.picture", "out.table"):
+        if isinstance(node, ast.Constant):
+            found = [table[node.value] for table in figures if node.value in table]
+            assert found
+            assert any(
+                fields_of([*f.get("head", []), *(f.get(k, "") for k in ("x", "y", "caption"))]) <= words for f in found
+            )

@@ -12,10 +12,9 @@ import sarcl
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.model.lazy_rows import Columns, Scaled, Tapered
 from sarcl.phase_correction import _phase_gradient, _phase_smoothing
-from sarcl.phase_correction._aperture_view import ApertureView
+from sarcl.phase_correction._aperture_view import ApertureView, narrow_pulses
 from sarcl.phase_correction._bright_points import brightest, contributions
-from sarcl.phase_correction._constant_echo import without_constant_echo
-from sarcl.phase_correction._narrow_aperture import narrow_pulses
+from sarcl.phase_correction._echo_parts import without_constant_echo
 from sarcl.reference.backproject import backproject as exact_image
 
 CENTER, BANDWIDTH, N_SAMPLES, N_PULSES, SIDE = 9.6e9, 300e6, 96, 128, 30.0

@@ -7,7 +7,7 @@ import pytest
 
 import sarcl
 from sarcl.base.constants import SPEED_OF_LIGHT
-from sarcl.phase_correction import _phase_smoothing, _smooth_search
+from sarcl.phase_correction import _phase_smoothing, _search
 from sarcl.phase_correction._echo_parts import near_and_far
 from sarcl.phase_correction.autofocus import _aperture_view
 
@@ -54,8 +54,8 @@ def test_a_large_smooth_phase_is_found_from_that_of_single_pulses():
     points = 1 + np.exp(2j * np.pi * (3 * pulses / n + random.random(20)))
     v = (points * np.exp(2j * np.pi * random.random(20) + 1j * phase[:, None])).astype(np.complex64)
     free = np.angle(np.exp(1j * (phase + random.normal(scale=0.4, size=n))))
-    found = _smooth_search.curves(v, free, 64.0)[_smooth_search.MODES.index(modes)]
+    found = _search.curves(v, free, 64.0)[_search.MODES.index(modes)]
     left = _phase_smoothing.detrended(found - phase)
     assert left.std() < 0.1
-    lost = _smooth_search.curves(v, np.zeros(n), 64.0)[_smooth_search.MODES.index(modes)]
+    lost = _search.curves(v, np.zeros(n), 64.0)[_search.MODES.index(modes)]
     assert _phase_smoothing.detrended(lost - phase).std() > 1

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from helpers.devices import opened, variants
-from helpers.fdtd_cases import sphere_intervals
+from helpers.far_field import amplitude
 
 from sarcl import shapes
 from sarcl.base.constants import SPEED_OF_LIGHT
@@ -13,9 +13,8 @@ from sarcl.fullwave.bodies.cut_cells import conductor
 from sarcl.fullwave.bodies.materials import Body, bodies
 from sarcl.fullwave.bodies.mesh_lines import mesh_lines
 from sarcl.fullwave.currents import currents
-from sarcl.fullwave.far_field import amplitude
 from sarcl.fullwave.incident import PlaneWave
-from sarcl.fullwave.lattice import lattice_around
+from sarcl.fullwave.lattice import lattice_around, sphere_intervals
 from sarcl.fullwave.pulse import Pulse
 from sarcl.fullwave.target import material_edges
 from sarcl.reference.mie import conducting_sphere, dielectric_sphere

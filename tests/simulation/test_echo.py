@@ -9,7 +9,7 @@ from helpers.cases import thinned
 import sarcl
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.numerics.pulse_geometry import PulseGeometry
-from sarcl.reference.echo import echo as exact_echo
+from sarcl.reference.equations import point_echo as exact_echo
 
 CHIRP = sarcl.Waveform.chirp(center=9.6e9, bandwidth=600e6, duration=2e-6)
 

@@ -10,8 +10,9 @@ import sarcl
 from sarcl import shapes
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.numerics import cost_model
-from sarcl.reference.echo import echo as exact_echo
-from sarcl.simulation import _facet_spreading, _kernel_images, _point_spreading, echo_check
+from sarcl.reference.equations import point_echo as exact_echo
+from sarcl.simulation import _facet_spreading, echo_check, kernel_images
+from sarcl.simulation.points import direct
 
 CHIRP = sarcl.Waveform.chirp(center=9.6e9, bandwidth=200e6, duration=1e-6)
 WINDOW = {"range_window": (-40.0, 40.0), "reference": (0.0, 0.0, 0.0), "check": False, "tolerance": 1e-3}
@@ -49,13 +50,13 @@ def test_points_on_a_lattice_keep_the_tolerance_where_an_image_is_in_phase(devic
     scene = lattice(track, CHIRP.center + image * (rate - 0.4 * CHIRP.bandwidth))  # the image of the band's edge
     raw = sarcl.echo(scene, CHIRP, track, **options)
     assert error_of(raw, scene) <= raw.report.predicted_error <= 1e-3
-    monkeypatch.setattr(_kernel_images, "SAFETY", 0.0)  # without the measured images the lattice breaks the tolerance
+    monkeypatch.setattr(kernel_images, "SAFETY", 0.0)  # without the measured images the lattice breaks the tolerance
     raw = sarcl.echo(scene, CHIRP, track, **options)
     assert error_of(raw, scene) > 1e-3
 
 
 def test_a_check_that_measures_more_than_the_tolerance_raises_and_keeps_the_echoes(monkeypatch, patches):
-    monkeypatch.setattr(_kernel_images, "SAFETY", 0.0)
+    monkeypatch.setattr(kernel_images, "SAFETY", 0.0)
     track = still(seen_from(8e3, 0.6, 0.5))
     rate = 440 * CHIRP.bandwidth / 107
     scene = lattice(track, CHIRP.center - rate + 0.4 * CHIRP.bandwidth)
@@ -69,7 +70,7 @@ def test_a_check_that_measures_more_than_the_tolerance_raises_and_keeps_the_echo
 @pytest.mark.parametrize("array", [None, sarcl.AntennaArray.linear(9, spacing=0.015, frequency_step=1e6)])
 @pytest.mark.parametrize("add", [sarcl.Scene.points([[1.0, 2.0, 0.0]]), shapes.plate((2, 2), two_sided=False)])
 def test_a_lattice_that_no_plan_can_take_is_refused_in_the_numbers_of_the_caller(monkeypatch, patches, array, add):
-    monkeypatch.setattr(_kernel_images, "SAFETY", 1e9)  # images of every kernel exceed the tolerance
+    monkeypatch.setattr(kernel_images, "SAFETY", 1e9)  # images of every kernel exceed the tolerance
     track = sarcl.Trajectory.line(start=(8e3, 3e3, 6e3), velocity=(0, 10, 0), prf=100.0, n_pulses=24)
     scene = lattice(track, 9e9) + add
     options = {k: v for k, v in WINDOW.items() if k != "check"} | {"array": array}
@@ -79,7 +80,7 @@ def test_a_lattice_that_no_plan_can_take_is_refused_in_the_numbers_of_the_caller
 
 
 def test_few_scatterers_take_the_plan_for_the_worst_case_and_sample_no_patches(monkeypatch):
-    monkeypatch.setattr(_point_spreading, "sample_patches", None)
+    monkeypatch.setattr(direct, "sample_patches", None)
     track = still(seen_from(8e3, 0.6, 0.5))
     for image in np.linspace(3e9, 9e9, 13):  # frequencies at which all points are in phase
         scene = lattice(track, image)

@@ -19,23 +19,7 @@ from ...base.rows import spread_over
 from ...base.vectors import unit
 from ...model.phase_history import PhaseHistory
 from ...opencl.device import DeviceChoice
-from ._sweep import sweep
 from .case import RAW, REACH, Case
-
-__all__ = [
-    "CONVENTIONAL",
-    "RAW",
-    "Case",
-    "cut",
-    "dip",
-    "is_resolved",
-    "measure",
-    "pair",
-    "response",
-    "run",
-    "sweep",
-    "told_apart",
-]
 
 CONVENTIONAL = "conventional"
 STEPS = 24  # samples of a cut per null of the conventional antenna

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Mapping, Sequence
+from pkgutil import get_data
 from typing import Any
 
 from ...figures.html import Block, heading, page, plot, table, terms, words
@@ -15,28 +17,11 @@ __all__ = ["html", "section", "setting", "verdicts"]
 
 Result = Mapping[str, Any]
 TITLE = "Frequency-diverse apertures"
-TERMS = (
-    ("conventional", "An antenna with the same phase centres, track and band that sends a chirp. The setting of each "
-     "case says whether it is one antenna or an array."),
-    ("mapping", "What is done to the echoes of the diverse array before they are focused. unmodified: nothing. "
-     "corrected: delay and phase of every channel, as seen from the scene's centre, are taken out. apparent: the "
-     "corrected echoes are focused from the positions of Farooq's equations instead of the antenna's. channels: every "
-     "channel is focused from its own element at its own carrier, the matched filter of the model."),
-    ("across, y", "The direction in the ground plane at right angles to the line of sight from mid-aperture, m. Points "
-     "lie along it, and the image is cut along it."),
-    ("null", "Half the distance between the first minima on both sides of a peak, m; half power: the width between the "
-     "points where the power has fallen to one half, m."),
-    ("PSLR, ISLR", "Highest side lobe over the peak (peak side-lobe ratio), and energy of all side lobes over that of "
-     "the main lobe (integrated side-lobe ratio), dB."),
-    ("dip", "How far the image of two equal points falls between their peaks, dB below the lower peak."),
-    ("resolved", f"Two points are resolved where the image has {rule()}. Peaks are those of the cut across, through "
-     "both points. A separation from which on they are resolved is one of those tried; the same holds at every larger "
-     "one that was tried."),
-    ("spatial frequencies", "f/c times the sum of the unit vectors from the scene's centre to the transmitter and to "
-     "the receiver, in cycles/m. Their spread across sets the resolution across. Collected: those of the echoes. "
-     "Implied: those of the positions from which the echoes are focused."),
-    ("0 dB", "The peak of a unit point in focus, seen by one element."),
-)  # fmt: skip
+
+
+def _terms() -> dict[str, str]:
+    """Terms of the page, with what they mean: terms.toml beside this file."""
+    return tomllib.loads((get_data(__package__, "terms.toml") or b"").decode())
 
 
 def html(
@@ -60,7 +45,7 @@ def html(
         heading("Conclusion"),
         bullets(conclusion(results)),
         heading("Terms"),
-        terms(TERMS),
+        terms([(term, text.format(rule=rule())) for term, text in _terms().items()]),
     ]
     if not finished:
         blocks.insert(1, words("Not finished: more cases follow.", True))

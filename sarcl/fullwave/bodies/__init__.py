@@ -15,5 +15,3 @@ For this folder alone:
     _least_areas  the least areas of cut faces with which the time steps are stable
     _thin_parts   parts of a mesh that are thinner than a cell: refusals, and sheets in place of narrow strips
 """
-
-__all__ = ["cut_cells", "materials", "mesh_lines"]

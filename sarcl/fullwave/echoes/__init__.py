@@ -19,5 +19,3 @@ For this folder alone:
     _run_progress      progress of several runs
     _run_speed         speed of a device with runs, measured on a small grid
 """
-
-__all__ = ["fullwave_echo"]

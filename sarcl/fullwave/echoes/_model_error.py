@@ -30,7 +30,7 @@ from ._fullwave_task import FullwaveTask
 
 RATIO = 1.5  # of the cells, about: such a run takes a fifth of the time, 1.5^-4
 FINER = 1.15  # by which its cells may be smaller, so that flat sides lie on nodes
-# powers of the size of cells with which errors fall, measured: docs/theory/full_wave.md
+# powers of the size of cells with which errors fall, measured: docs/theory/full_wave_bodies.md
 CONDUCTOR, SHEETS, DIELECTRIC, LOSSY = 1.5, 1.0, 2.0, 1.25
 LOSS = 0.05  # of a permittivity, imaginary over real part, from which on a body counts as lossy
 MOST_PULSES = 32  # at which echoes are compared

@@ -51,8 +51,7 @@ class FullwaveOptions(TrackOptions):
         in_files=False,
     )
     tolerance: float = option(
-        3e-2,
-        "L2 error of waveform forming: of the samples against those of a run at every pulse, on the same grid",
+        3e-2, "L2 error of waveform forming: of the samples against those of a run at every pulse, on the same grid"
     )
     check: bool = option(False, "one run more per polarisation sent, between anchors: report.measured_error", flag)
     model_error: bool = option(

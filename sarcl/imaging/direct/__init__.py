@@ -11,5 +11,3 @@ For this folder alone:
     _line_curvature     difference of the curvature of wavefronts over a tile and a group of pulses
     _shared_line_plan   plan of backprojection by lines that a work-group shares
 """
-
-__all__ = ["direct", "line_plan", "tile_kernels"]

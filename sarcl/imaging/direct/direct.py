@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,20 +13,17 @@ from ...numerics import cost_model
 from ...numerics.cost_model import CPU, DeviceClass
 from ...numerics.plan import Plan, cheapest
 from ...numerics.tiles import Tiles
-from ...opencl.device import Device
+from ...opencl.device import Buffer, Device
 from ..antenna_beam import AntennaOnDevice
 from ..engine import DirectEngine, RowProfiles, Skipped
 from ..focusing_task import FocusingTask
 from ..pixel_taper import TaperOnDevice
-from ..tiling.lines import LineTiling
 from ..tiling.of_grid import tiling_of
+from ..tiling.plane import LineTiling
 from ..tiling.tiling import FlatImage, Tiling
 from . import _shared_line_plan, line_plan
 from .line_plan import LinePlan
 from .tile_kernels import CHUNK, Block, KernelForm, Profiles, Pulses, kernel_of
-
-if TYPE_CHECKING:
-    from ...opencl.device import Buffer
 
 LEAST_COST = 0.9  # cost per contribution below that of every plan pixel by pixel
 

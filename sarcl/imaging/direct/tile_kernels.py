@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,18 +16,15 @@ from ...base import float_pairs
 from ...numerics.plan import Plan
 from ...numerics.tile_constants import TileConstants
 from ...numerics.tiles import Tiles
-from ...opencl.device import Device
+from ...opencl.device import Buffer, Device
 from ...opencl.launch_numbers import launch_numbers
 from ..pixel_taper import WEIGHT_BUFFERS
-from ..tiling.lines import LineTiling
+from ..tiling.plane import LineTiling
 from ..tiling.tiling import Tiling
 from . import _shared_line_plan, line_plan
 from ._line_curvature import steps
 from ._shared_line_plan import SharedLinePlan
 from .line_plan import LinePlan
-
-if TYPE_CHECKING:
-    from ...opencl.device import Buffer
 
 CHUNK = 64  # rows added in float32 before the compensated total; blocks of rows are multiples of it
 ENTRY = 24  # numbers that a pulse takes in the record of its group: N_ENTRY of kernels/line_schedule.clh

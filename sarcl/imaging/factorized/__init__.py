@@ -8,8 +8,6 @@ For other folders:
 For this folder alone:
 
     _memory          blocks within a memory limit
-    _subapertures    runs of pulses, decimated level by level
+    _tile_chains     sides of tiles level by level, and the smooth runs of rows that are decimated
     _tile_coverage   which of the largest tiles lie in the range window and beam of which rows
 """
-
-__all__ = ["factorized", "plan"]

@@ -9,8 +9,7 @@ import numpy as np
 
 from ...base import text
 from ..engine import RowProfiles
-from ..tiling.tiling import Part, Tiling
-from ..tiling.tree import Tree
+from ..tiling.tiling import Part, Tiling, Tree
 from .plan import FactorPlan
 
 ROWS = 256  # rows per block of the first level

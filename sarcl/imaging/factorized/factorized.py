@@ -10,27 +10,22 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...base import float_pairs
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.stage_timer import Clock
-from ...opencl.device import Device
+from ...opencl.device import Buffer, Device
 from ...opencl.launch_numbers import launch_numbers
 from ..direct.direct import Direct
 from ..direct.tile_kernels import Block, KernelForm, Profiles, Pulses, TilesOnDevice, kernel_of
 from ..engine import Engine, RowProfiles, Skipped
 from ..focusing_task import FocusingTask
-from ..tiling.tiling import FlatImage, Roots, Tiling
-from ..tiling.tree import Tree
+from ..tiling.tiling import FlatImage, Roots, Tiling, Tree
 from ._memory import MemoryPlan
 from ._tile_coverage import TileCoverage, coverage_of, same_coverage, without
 from .plan import GUARD, FactorPlan, Level, moving_cost
-
-if TYPE_CHECKING:
-    from ...opencl.device import Buffer
 
 MERGE = "merge_subapertures.cl"
 SPAN = 32  # vectors of a profile per work-item on CPUs; 1 on GPUs, where neighbouring work-items then read one line

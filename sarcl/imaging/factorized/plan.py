@@ -16,15 +16,16 @@ from ...numerics.cost_model import CPU, DeviceClass
 from ...numerics.interpolation import Interpolator
 from ...numerics.plan import Plan, cheapest
 from ...numerics.pulse_geometry import PulseGeometry
+from ...numerics.subapertures import Decimation, decimated, filter_error, rate
 from ...opencl import fft
 from ..direct import line_plan
 from ..direct.line_plan import LinePlan
 from ..direct.tile_kernels import CHUNK
 from ..focusing_task import FocusingTask
-from ..tiling.lines import LineTiling
 from ..tiling.of_grid import tiling_of
+from ..tiling.plane import LineTiling
 from ..tiling.tiling import Tiling
-from ._subapertures import Decimation, chains, decimated, filter_error, rate, runs_of
+from ._tile_chains import chains, runs_of
 
 SPACINGS = (1.5, 1.75, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0)  # profile samples per 1/bandwidth
 TAPS = (4, 6, 8)  # taps of the interpolators along range and along the track

@@ -7,7 +7,4 @@ For other folders:
 
 For this folder alone:
 
-    _pulse_records   rows as kernels/geometry_float64.clh lays them out
 """
-
-__all__ = ["direct", "plan"]

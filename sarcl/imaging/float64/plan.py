@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -91,10 +91,7 @@ def make_plan(task: FocusingTask, tolerance: float) -> tuple[Float64Plan, Tiling
         raise ToleranceUnreachable(tolerance, best, "float64 range profiles", how=how)
     cheaper = [p for p in plans if p.cost < good.cost]
     other = min(cheaper, key=lambda p: p.predicted_error, default=None)
-    named = Float64Plan(
-        good.interpolator, good.length, good.per_tile, good.order, good.predicted_error, good.cost, other
-    )
-    return named, tilings[named.per_tile]
+    return replace(good, next_cheaper=other), tilings[good.per_tile]
 
 
 def _plans(task: FocusingTask, tilings: dict[int, Tiling], energy: ProfileEnergy) -> Iterator[Float64Plan]:

@@ -9,5 +9,3 @@ For this folder alone:
     _samples       weighted samples, made on the device or on the host
     _wavefront     wavenumbers of plane waves, and the error of neglected curvature
 """
-
-__all__ = ["polar_format"]

@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
-from ...numerics.range_profiles import LARGEST
 from ...numerics.weighted_samples import WeightedSamples
 from ...opencl import fft
-from ...opencl.device import Device
+from ...opencl.device import Buffer, Device
 from ...opencl.pipeline import Pipeline
-from ..focusing_task import FocusingTask
+from ..focusing_task import FocusingTask, weighted_rows
 from ._wavefront import Waves
-
-if TYPE_CHECKING:
-    from ...opencl.device import Buffer
 
 
 class WeightedRows:
@@ -71,20 +65,13 @@ class WeightedRows:
         """Samples of rows start ... stop - 1 times their weights, with phases relative to the centre: complex64."""
         task, rows = self.task, slice(start, stop)
         raw = task.raw
-        samples = raw.read(start, stop) * np.outer(task.row_weight[rows], task.sample_weight).astype(np.float32)
+        samples, largest = weighted_rows(raw, (task.sample_weight, task.row_weight), start, stop)
+        self.largest = max(self.largest, largest)
         # where the reference is the centre, the shift is rounding alone
         shift = float(np.abs(self.waves.shift[rows]).max())
         if shift * 4 * np.pi * task.highest / SPEED_OF_LIGHT > 1e-3 * self.tolerance:
             first, step = (cycles[:, None] for cycles in self._cycles(rows))
             samples = samples * np.exp(2j * np.pi * (first + step * np.arange(raw.n_samples)))
-        largest = float(np.abs(samples).max(initial=0.0))
-        self.largest = max(self.largest, largest)
-        n_samples = raw.n_rows * raw.n_samples
-        if largest > LARGEST[np.complex64] / n_samples:
-            raise ValueError(
-                f"samples times weights reach {largest:.1e}; sums of {n_samples} in complex64 hold up to "
-                f"{LARGEST[np.complex64]:.0e}: scale the samples down"
-            )
         out = samples.astype(np.complex64)
         self._energies[rows] = (out.real.astype(np.float64) ** 2 + out.imag.astype(np.float64) ** 2).sum(axis=1)
         return out

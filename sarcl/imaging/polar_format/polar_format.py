@@ -19,10 +19,8 @@ from ...model.phase_history import PhaseHistory
 from ...numerics import cost_model
 from ...numerics.nufft2d import Gridder, make_plan, tile_of
 from ...numerics.range_profiles import check_digits
-from ...opencl import memory_budget
 from ...opencl.choose_device import open_device
-from ..collection import collection
-from ..focus_options import GridOptions, check_output, finished
+from ..focus_options import GridOptions, check_output, collection, finished, relative_error
 from ..focusing_task import FocusingTask, make_task
 from ..forecast import speed
 from ._samples import WeightedRows
@@ -74,7 +72,7 @@ def polar_format(raw: PhaseHistory, grid: ImageGrid, options: PolarFormatOptions
     if task.raw.n_rows < 2:
         raise ValueError(f"raw has {task.raw.n_rows} row of weight > 0; a synthetic aperture needs at least 2")
     device = open_device(options.device)
-    budget = min(memory_budget.budget(device, options.max_bytes), device.info.memory)
+    budget = options.budget(device)
     waves = waves_about(task.raw, grid.at(grid.shape[0] // 2, grid.shape[1] // 2))
     bent = curvature(task.raw, waves, grid)
     _warn(task, waves, bent)
@@ -131,10 +129,7 @@ class PolarFormatPlan:
         options, task, plan, clock = self.options, self.task, self.engine.plan, Clock(self.seconds)
         grid = task.grid
 
-        def on_progress(share: float) -> None:
-            if options.progress:
-                options.progress("polar format", round(1000 * share), 1000)
-
+        on_progress = options.shares_of("polar format")
         data = self.engine.image(self.samples, grid.shape, self.budget, clock, on_progress)
         check_digits(self.samples.largest)
         norm, random = _norm(data), float(np.sqrt(self.samples.energy() * grid.size))
@@ -142,7 +137,9 @@ class PolarFormatPlan:
         if norm < random:
             details["error of a dark image"] = f"{plan.predicted_error * random / norm:.1e}" if norm else "unknown"
         details |= _describe(self.bent)
-        measured = self._measured(data, clock)
+        pairs = CHECKED * task.raw.n_rows * self.raw.n_samples
+        seconds = clock.seconds["gridding"]
+        measured = options.measured(pairs, seconds, clock, lambda: _measure_error(task, self.waves, data))
         image = Image(
             data,
             grid,
@@ -162,15 +159,6 @@ class PolarFormatPlan:
             ),
         )
         return finished(image, self.options.out, "use backproject")
-
-    def _measured(self, data: np.ndarray, clock: Clock) -> float | None:
-        """The error at random pixels, where that is asked for or cheap."""
-        pairs = CHECKED * self.task.raw.n_rows * self.raw.n_samples
-        if not self.options.is_checked(pairs, clock.seconds["gridding"]):
-            return None
-        measured = _measure_error(self.task, self.waves, data)
-        clock.lap("check")
-        return measured
 
 
 def _warn(task: FocusingTask, waves: Waves, bent: Curvature) -> None:
@@ -218,5 +206,4 @@ def _measure_error(task: FocusingTask, waves: Waves, data: np.ndarray) -> float:
 
     index, positions = task.grid.sample(CHECKED, seed=0)
     truth, random = exact(task.raw, positions, waves.center, task.sample_weight, task.row_weight)
-    wrong = float(np.linalg.norm(data[index] - truth))
-    return wrong / max(float(np.linalg.norm(truth)), random) if wrong else 0.0
+    return relative_error(data[index], truth, random)

@@ -6,17 +6,14 @@ For other folders:
 
 For this folder alone:
 
-    _along_track      FFTs or sums along the track on the host: rows to Doppler bins, and these to rows of the image
     _aperture_window  a window over the beam, as weights of Doppler bins
     _bins             Doppler bins: secondary range compression, migration, azimuth compression
     _doppler          Doppler band that an image needs, Doppler centroid
     _extent           rows and columns of the image, the range window and the pulse rate they need
     _focus            the work: azimuth FFT, secondary range compression, migration, azimuth compression
     _focus_on_device  the same on a GPU, from samples that go up once to the image that comes down once
-    _gain             gain of each pixel: the sum of the weights of the rows that see it
     _ground           positions at zero-Doppler times and slant ranges, at a height or on an elevation model
     _host_rows        rows with weights and one reference range, made on the host
-    _looks            two looks of an image along the track
     _map_drift        Doppler rate from the displacement of two looks
     _options          options of range_doppler
     _plan             rows, columns, Doppler bins, range blocks and the predicted error
@@ -26,5 +23,3 @@ For this folder alone:
     _uneven_energy    errors where energy lies unevenly over rows and ranges: ends of the Doppler band, dark columns
     _velocity         ranges from a track to points as hyperbolas: effective velocity at several slant ranges
 """
-
-__all__ = ["range_doppler"]

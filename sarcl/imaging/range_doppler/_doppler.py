@@ -143,10 +143,10 @@ def centroid_of_data(raw: PhaseHistory, step: float, speed: float, expected: flo
     return float(np.clip(wavelength * centroid / (2 * speed), -STEEPEST, STEEPEST))
 
 
-def _doubt(products: np.ndarray, frequency: np.ndarray, rate: float, found: float, wanted: float) -> None:
-    """Warn where Doppler frequencies that grow with the frequency tell another multiple of the pulse rate than `found`.
+def _doubt(products: np.ndarray, frequency: np.ndarray, rate: float, centroid: float, expected: float) -> None:
+    """Warn where Doppler frequencies that grow with the frequency tell of another multiple of the pulse rate.
 
-    products  of neighbouring rows, (rows, samples), at frequencies, Hz;  wanted  Hz, centroid of the geometry
+    products  of neighbouring rows, (rows, samples), at frequencies, Hz;  expected  Hz, centroid of the geometry
     """
     half = len(frequency) // 2
     if half < 2 or len(products) < 2 * PARTS:
@@ -157,10 +157,10 @@ def _doubt(products: np.ndarray, frequency: np.ndarray, rate: float, found: floa
     estimates = turns * rate * float(frequency.mean()) / apart
     deviation = float(estimates.std() / np.sqrt(PARTS - 1))
     absolute = float(np.median(estimates))
-    nearest = found + rate * round((absolute - found) / rate)
-    if abs(nearest - found) > rate / 2 and SURE * deviation < rate / 2:
+    nearest = centroid + rate * round((absolute - centroid) / rate)
+    if abs(nearest - centroid) > rate / 2 and SURE * deviation < rate / 2:
         warn(
             f"Doppler frequencies of the echoes change over the band as those of a centroid of {absolute:.5g} Hz do, "
-            f"where {found:.5g} Hz is used, the nearest to the {wanted:.5g} Hz of the track and reference ranges; the "
-            f"pulse rate is {rate:.5g} Hz. Give near={nearest:.5g}, or near={found:.5g} where that is right"
+            f"where {centroid:.5g} Hz is used, the nearest to the {expected:.5g} Hz of the track and reference ranges; "
+            f"the pulse rate is {rate:.5g} Hz. Give near={nearest:.5g}, or near={centroid:.5g} where that is right"
         )

@@ -11,8 +11,7 @@ from ...base import host_memory
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.errors import warn
 from ...base.text import size_text
-from ...base.validation import number
-from ...model.image_grid import pair
+from ...base.validation import number, pair
 from ...model.phase_history import PhaseHistory
 from ...numerics import windows
 from ._aperture_window import ApertureWindow

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from ...base.stage_timer import Clock
 from ...numerics.range_profiles import check_digits
 from ...numerics.transforms import Transforms
 from ...numerics.weighted_samples import WeightedSamples, bound_of_held
-from ...opencl.device import Device
+from ...opencl.device import Buffer, Device
 from ...opencl.fft_batches import Batches
 from ...opencl.launch_numbers import launch_numbers
 from ...opencl.pipeline import SLOTS, Pipeline
@@ -27,9 +27,6 @@ from ._bins import Bins
 from ._doppler import EVANESCENT
 from ._host_rows import ARRAYS, Job, referenced, turns
 from ._plan import SEGMENT, FocusPlan
-
-if TYPE_CHECKING:
-    from ...opencl.device import Buffer
 
 LENGTHS = 3  # lengths of FFTs: along the track, of range profiles, back; the programs of each keep their memory
 WORK = 1 / 16  # share of a budget for the rows that are transformed at a time, with one of these lengths
@@ -81,13 +78,13 @@ class Room:
     """Arrays and blocks that fit on a device.
 
     spectra, folded  whether the rows and their spectra stay there, and the compressed Doppler bins
-    work     bytes for the rows of a transform;  left  for blocks of all else;  bins  Doppler bins at a time
+    work     bytes for the rows of a transform;  remainder  for blocks of all else;  bins  Doppler bins at a time
     """
 
     spectra: bool
     folded: bool
     work: float
-    left: float
+    remainder: float
     bins: int
 
     @classmethod
@@ -162,7 +159,7 @@ class _Array:
                 transforms.columns(self.buffer, (n_rows, width), first, count)
                 transforms.lay(self.buffer, width, first, count, weights, 0, sign)
             return
-        at_once = max(1, min(transforms.most, int(room.left // (8 * (n_rows + n)))))
+        at_once = max(1, min(transforms.most, int(room.remainder // (8 * (n_rows + n)))))
         for first in range(0, width, at_once):
             part = np.ascontiguousarray(self.host[:n_rows, first : first + at_once])
             count = part.shape[1]
@@ -182,7 +179,7 @@ def _refer(job: Job, rows: _Array, weigher: WeightedSamples, room: Room) -> bool
     """Weighted rows of one reference range, made on the device; False where it may not hold their sums."""
     raw = job.raw
     rows.buffer = job.device.empty(8 * rows.shape[0] * rows.shape[1])
-    at_once = max(1, int(min(room.left, job.device.limits.upload) // weigher.row_bytes))
+    at_once = max(1, int(min(room.remainder, job.device.limits.upload) // weigher.row_bytes))
     with Pipeline(job.device) as pipeline:
         for start in range(0, raw.n_rows, at_once):
             stop = min(start + at_once, raw.n_rows)

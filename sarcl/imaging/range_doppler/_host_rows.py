@@ -8,8 +8,8 @@ import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
 from ...model.phase_history import PhaseHistory
-from ...numerics import range_profiles
 from ...opencl.device import Device
+from ..focusing_task import weighted_rows
 from ._plan import FocusPlan
 from ._track import Track
 
@@ -47,14 +47,8 @@ def turns(raw: PhaseHistory, start: int, stop: int, center: float) -> tuple[np.n
 
 def referenced(job: Job, start: int, stop: int) -> tuple[np.ndarray, float]:
     """Weighted rows start ... stop - 1 with the plan's reference range: complex64; and their largest modulus."""
-    raw, (sample_weight, row_weight) = job.raw, job.weights
-    samples = raw.read(start, stop) * np.outer(row_weight[start:stop], sample_weight).astype(np.float32)
-    largest = float(np.abs(samples).max(initial=0.0))
-    if largest > range_profiles.LARGEST[np.complex64] / (raw.n_rows * raw.n_samples):
-        raise ValueError(
-            f"samples times weights reach {largest:.1e}; sums of {raw.n_rows * raw.n_samples} in complex64 hold up to "
-            f"{range_profiles.LARGEST[np.complex64]:.0e}: scale the samples down"
-        )
+    raw = job.raw
+    samples, largest = weighted_rows(raw, job.weights, start, stop)
     first, step = (cycles[:, None] for cycles in turns(raw, start, stop, job.plan.center))
     # n = width a + b: exp(j 2 pi n s) is a product of one power for each digit, which takes far fewer exponentials
     width = int(np.ceil(np.sqrt(raw.n_samples)))

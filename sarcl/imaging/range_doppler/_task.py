@@ -12,7 +12,6 @@ from ...base.constants import SPEED_OF_LIGHT
 from ...earth.elevation import ElevationModel
 from ...model.phase_history import PhaseHistory
 from ...numerics import windows
-from ...opencl import memory_budget
 from ...opencl.choose_device import open_device
 from ...opencl.device import Device
 from ..focusing_task import weigh
@@ -20,8 +19,7 @@ from ._doppler import centroid_of_data, centroid_of_geometry, sine
 from ._extent import Extent, View, choose_extent
 from ._ground import Ground
 from ._host_rows import Budget
-from ._looks import TwoLooks
-from ._map_drift import converged
+from ._map_drift import TwoLooks, converged
 from ._options import RangeDopplerOptions
 from ._plan import FocusPlan, make_plan
 from ._track import REMEDY, Track
@@ -111,7 +109,7 @@ def range_doppler_task(raw: PhaseHistory, options: RangeDopplerOptions) -> Range
     centroids = _centroids(raw, track, speed, wavelength, options)
     opened = open_device(options.device)
     budget = Budget(
-        min(memory_budget.budget(opened, options.max_bytes), opened.info.memory),
+        options.budget(opened),
         host_memory.installed() / 2 if options.max_bytes is None else float(options.max_bytes),
     )
     view = View(raw, track, smooth, speed, centroids[1], least)

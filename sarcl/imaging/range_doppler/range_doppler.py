@@ -16,12 +16,10 @@ from ...base.verb import verb
 from ...model.image import Image
 from ...model.image_grid import ImageGrid
 from ...model.phase_history import PhaseHistory
-from ..collection import collection
-from ..focus_options import check_output, finished
+from ..focus_options import check_output, collection, finished, relative_error
 from ..forecast import speed
 from ._doppler import fresnel, sine
 from ._focus import focus
-from ._gain import gain_of
 from ._host_rows import Job
 from ._options import RangeDopplerOptions
 from ._plan import FocusPlan
@@ -37,6 +35,7 @@ BEYOND = (
 )
 
 CHECKED = 128  # pixels that a check computes exactly
+COLUMNS = 65  # slant ranges at which gains are summed; they are linear between: apertures grow as the slant range does
 
 
 @verb(RangeDopplerOptions)
@@ -99,21 +98,15 @@ class RangeDopplerPlan:
         if task.extent.has_beam and plan.band.window is None and task.beyond_beam < -TOLD:
             log.warning(BEYOND, -task.beyond_beam)
         clock.lap("plan")
-
-        def on_progress(share: float) -> None:
-            if self.options.progress:
-                self.options.progress("range Doppler", round(1000 * share), 1000)
-
-        data = focus(Job(task.device, plan, raw, task.track, weight, task.budget), clock, on_progress)
+        job = Job(task.device, plan, raw, task.track, weight, task.budget)
+        data = focus(job, clock, self.options.shares_of("range Doppler"))
         gain: float | np.ndarray = float(task.sample_weight.sum() * task.row_weight.sum())
         if task.extent.has_beam:
             gain = gain_of(plan, task.track, *weight, task.tolerance)
             if isinstance(gain, np.ndarray):
                 data[gain == 0] = 0
-        measured = None
-        if self.options.is_checked(CHECKED * raw.n_rows * raw.n_samples, sum(clock.seconds.values())):
-            measured = _measure_error(raw, task, grid, data)
-            clock.lap("check")
+        pairs, seconds = CHECKED * raw.n_rows * raw.n_samples, sum(clock.seconds.values())
+        measured = self.options.measured(pairs, seconds, clock, lambda: _measure_error(raw, task, grid, data))
         image = Image(
             data,
             grid,
@@ -157,5 +150,42 @@ def _measure_error(raw: PhaseHistory, task: RangeDopplerTask, grid: ImageGrid, d
         t = track.times[:, None]
         longer = (plan.fit.range(u, r, t) - task.known.range(u, r, t)).T
     truth, random = exact(raw, points, task.sample_weight, task.row_weight, wrap=True, share=share, longer=longer)
-    wrong = float(np.linalg.norm(data[index] - truth))
-    return wrong / max(float(np.linalg.norm(truth)), random) if wrong else 0.0
+    return relative_error(data[index], truth, random)
+
+
+def gain_of(
+    plan: FocusPlan, track: Track, sample_weight: np.ndarray, row_weight: np.ndarray, faintest: float
+) -> float | np.ndarray:
+    """Sums of the weights of the rows that see a pixel: gain(u, r) = sum_n w_n sum_p w_p b(s_p(u, r)), b the weight of
+    the Doppler band at the sine of row p. A number where it is the same in all pixels to 1e-6, else float32 (times,
+    ranges).
+
+    faintest  of the largest gain: pixels of less count as seen by no row
+    """
+    from scipy.signal import fftconvolve
+
+    n_rows, (n_times, n_ranges) = len(row_weight), (len(plan.times), len(plan.ranges))
+    chosen = np.unique(np.linspace(0, n_ranges - 1, COLUMNS).round().astype(int))
+    step = track.step / plan.finer
+    between = np.arange(-plan.finer * (n_rows - 1), n_times)
+    rows = np.zeros(plan.finer * (n_rows - 1) + 1)
+    rows[:: plan.finer] = row_weight * sample_weight.sum()
+    sums = np.empty((n_times, len(chosen)))
+    for k, column in enumerate(chosen):
+        distance = plan.ranges[column]
+        speed, _, shift = (float(v[0]) for v in plan.fit.at(np.array([distance])))
+        later = float(plan.times[0]) + shift - track.start + step * between
+        seen = plan.band.weight(sine(later, distance, np.array(0.0), speed))
+        sums[:, k] = fftconvolve(seen, rows, mode="valid")
+    largest = float(sums.max())
+    if sums.min() >= (1 - 1e-6) * largest:
+        return largest
+    out = np.empty((n_times, n_ranges), np.float32)
+    position = np.interp(np.arange(n_ranges), chosen, np.arange(len(chosen)))
+    before = np.minimum(position.astype(int), max(len(chosen) - 2, 0))
+    after, share = np.minimum(before + 1, len(chosen) - 1), position - before
+    for first in range(0, n_times, 256):  # in blocks: a large image is not held in float64
+        block = sums[first : first + 256]
+        out[first : first + 256] = block[:, before] * (1 - share) + block[:, after] * share
+    out[out < faintest * largest] = 0
+    return out

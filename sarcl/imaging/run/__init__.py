@@ -12,7 +12,4 @@ For other folders:
 For this folder alone:
 
     _shares        which device makes which bands of an image
-    _fingerprint   everything an image's pixels depend on, as text and checksums
 """
-
-__all__ = ["checkpoint", "dask_workers", "fill_bands", "image_output", "tile_files", "workers"]

@@ -18,8 +18,7 @@ from ..choose_method import MethodChoice
 from ..engine import Skipped
 from ..focusing_task import FocusingTask
 from ..tiling.tiling import FlatImage, Run
-from . import _fingerprint
-from .tile_files import TileStore, discard, folder_of, gaps
+from .tile_files import TileStore, discard, folder_of, gaps, job_of
 
 log = logging.getLogger(__name__)
 
@@ -134,7 +133,7 @@ class Checkpoint:
     def _open(self) -> TileStore:
         self.fresh = not self.folder.exists()
         chosen = self.chosen
-        job = _fingerprint.job(self.task, chosen.method, self.tolerance, chosen.plan, chosen.tiling, chosen.dtype)
+        job = job_of(self.task, chosen.method, self.tolerance, chosen.plan, chosen.tiling, chosen.dtype)
         try:
             self.tiles = TileStore(self.folder, job, chosen.tiling, chosen.dtype)
         except FileNotFoundError:  # another run has just completed the image and taken the folder away

@@ -159,12 +159,10 @@ class InFile:
             try:
                 rows_in_file = sarcl_hdf5.open_rows(self.file, self.name)
             except (OSError, KeyError) as exc:
-                raise OSError(
-                    f"{self.file!r} cannot be read here ({exc}); every worker needs it under this name"
-                ) from None
+                raise OSError(f"{self.file!r} cannot be read here ({exc}); every worker needs it") from None
             if rows_in_file.shape != self.shape or rows_in_file.dtype != self.dtype:
                 raise ValueError(
-                    f"{self.file!r} is another file here: its {self.name} are {rows_in_file.shape} {rows_in_file.dtype}"
+                    f"{self.file!r} is another file here, of {self.name} {rows_in_file.shape} {rows_in_file.dtype}"
                 )
             self._open = rows_in_file
         return np.asarray(self._open[rows])

@@ -22,18 +22,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike
 
-from ...base.fingerprint import as_bytes, checker
+from ...base.fingerprint import as_bytes, checker, checksum, kernels, leaves
 from ...base.types import PathLike
 from ...io import output_paths
-from ..engine import Skipped
+from ..engine import ImagePlan, Skipped
+from ..focusing_task import FocusingTask
 from ..tiling.tiling import Run, Tiling
-from ._fingerprint import difference, mark
 
 log = logging.getLogger(__name__)
 
 MAGIC = b"sarcl tiles 2\n"
 NAME = re.compile(r"bands-(\d+)-(\d+)\.tiles")
 DIGEST = 32  # bytes
+FOREIGN = "belongs to another job"  # reason why a file is left alone
 
 
 def folder_of(path: PathLike) -> Path:
@@ -101,12 +102,8 @@ class TileStore:
             raise
 
     def clear(self) -> None:
-        """Remove this job's files, and the folder unless something else is in it."""
-        for path in _tiles(self.folder):
-            if self._mark_in(path) in (self.mark, None):
-                path.unlink(missing_ok=True)
-        if not _tiles(self.folder):
-            discard(self.folder)
+        """Remove the files, and the folder unless something else is in it."""
+        discard(self.folder)
 
     def _path(self, first: int, last: int) -> Path:
         return self.folder / f"bands-{first:06d}-{last:06d}.tiles"
@@ -168,19 +165,6 @@ class TileStore:
         values = np.frombuffer(data, self.dtype, size // self.dtype.itemsize, start)
         return values.reshape(extent.stop - extent.start, *self.tiling.row_shape), Skipped(**head["skipped"]), ""
 
-    def _mark_in(self, path: Path) -> str | None:
-        """The fingerprint in the head of a file; None where it cannot be read."""
-        try:
-            with open(path, "rb") as file:
-                start = file.read(len(MAGIC) + 8)
-                mark = json.loads(file.read(min(struct.unpack("<Q", start[len(MAGIC) :])[0], 4096)))["job"]
-        except (OSError, ValueError, KeyError, TypeError, struct.error):
-            return None
-        return str(mark)
-
-
-FOREIGN = "belongs to another job"
-
 
 def discard(folder: Path) -> None:
     """Remove all tile files, of any job, from a folder, and the folder if it is empty then."""
@@ -219,3 +203,52 @@ def gaps(runs: list[Run], first: int, last: int) -> list[Run]:
 
 def _tiles(folder: Path) -> list[Path]:
     return [path for path in folder.glob("bands-*.tiles") if NAME.fullmatch(path.name)]
+
+
+def job_of(
+    task: FocusingTask, method: str, tolerance: float, plan: ImagePlan, tiling: Tiling, dtype: DTypeLike
+) -> dict[str, Any]:
+    """Everything that the pixels depend on, as text and numbers; arrays, and the samples, as checksums.
+
+    The device and its memory are left out: they change nothing but rounding. Reads all samples. TypeError for an option
+    that cannot be described.
+    """
+    from ...base.version import __version__
+
+    raw, grid, antennas = task.raw, task.grid, task.antennas
+    samples = checker()
+    step = max(1, 2**24 // (raw.n_samples * np.dtype(raw.samples.dtype).itemsize))
+    for start in range(0, raw.n_rows, step):
+        samples.update(as_bytes(raw.read(start, min(start + step, raw.n_rows))))
+    described = {"raw", "grid", "antennas", "sample_weight", "row_weight", "wrap", "skips"}
+    others = set(task.__dataclass_fields__) - described
+    return {
+        "sarcl": f"{__version__}, kernels {kernels()}",
+        "method": method,
+        "tolerance": tolerance,
+        "plan": ", ".join(f"{k} {v}" for k, v in plan.describe(method).items()),
+        "pixels": np.dtype(dtype).name,
+        "samples": f"{raw.n_rows} x {raw.n_samples} {np.dtype(raw.samples.dtype).name} {samples.hexdigest()[:32]}",
+        "antennas": checksum(*leaves(antennas)),
+        "weights": checksum(task.sample_weight, task.row_weight),
+        "grid": f"{' x '.join(map(str, grid.shape))} {checksum(*leaves(grid))}",
+        "bands": tiling.n_bands,
+        "wrap": task.wrap,
+        "skip": ", ".join(sorted(task.skips)),
+        "options": checksum(*(value for name in sorted(others) for value in (name, *leaves(getattr(task, name))))),
+    }
+
+
+def mark(job: dict[str, Any]) -> str:
+    """The job's fingerprint."""
+    return checksum(json.dumps(job, sort_keys=True))
+
+
+def difference(stored: dict[str, Any], job: dict[str, Any]) -> str:
+    """The differences between two jobs, in words."""
+    differences = []
+    for name, value in job.items():
+        if stored.get(name) != value:
+            plain = name in ("sarcl", "method", "tolerance", "pixels", "wrap", "skip")
+            differences.append(f"{name} was {stored.get(name)}, is {value}" if plain else f"other {name}")
+    return "; ".join(differences) or "other options"

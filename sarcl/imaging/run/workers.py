@@ -47,14 +47,9 @@ class WorkerPool(Protocol):
     least_pixels  pixels per block below which a pixel costs noticeably more
     """
 
-    @property
-    def size(self) -> int: ...
-
-    @property
-    def names(self) -> list[str]: ...
-
-    @property
-    def least_pixels(self) -> float: ...
+    size: int
+    names: list[str]
+    least_pixels: float
 
     def focus(self, work: Work) -> Generator[FinishedBlock, None, None]:
         """Focus the bands in blocks; yields each block when it is finished, in any order."""

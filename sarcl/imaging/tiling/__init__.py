@@ -2,15 +2,11 @@
 
 For other folders:
 
-    lines        the tiling of planes for lines of pixels
     of_grid      tiling_of(): the tiling of a grid
-    plane        the tiling of planes
-    tiling       what every tiling offers; parts and sections of it
-    tree         quadtree of tiles
+    plane        the tilings of planes, for pixels and for lines of them
+    tiling       what every tiling offers; parts and sections of it, and their quadtrees
 
 For this folder alone:
 
     _points      the tiling of listed points
 """
-
-__all__ = ["lines", "of_grid", "plane", "tiling", "tree"]

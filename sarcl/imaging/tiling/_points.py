@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -12,12 +11,8 @@ import numpy as np
 from ...base.morton import morton_order
 from ...model.image_grid import ImageGrid
 from ...numerics.tiles import Tiles, tile_points
-from ...opencl.device import Device
-from .tiling import FlatImage, Orders, Part, Roots, Run, Section, Tiling
-from .tree import Tree
-
-if TYPE_CHECKING:
-    from ...opencl.device import Buffer
+from ...opencl.device import Buffer, Device
+from .tiling import FlatImage, Orders, Part, Roots, Run, Section, Tiling, Tree
 
 LISTED = 2**18  # points of a band, the unit in which an image is made and its tiles are kept
 KEPT = 2**25  # points of a grid whose order is kept, in 4 bytes each

@@ -4,20 +4,15 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...base import float_pairs
 from ...model.image_grid import ImageGrid
 from ...numerics.tiles import Tiles
-from ...opencl.device import Device
+from ...opencl.device import Buffer, Device
 from ...opencl.launch_numbers import launch_numbers
-from .tiling import FlatImage, Orders, Part, Roots, Run, Section, Tiling
-from .tree import Tree
-
-if TYPE_CHECKING:
-    from ...opencl.device import Buffer
+from .tiling import FlatImage, Orders, Part, Roots, Run, Section, Tiling, Tree
 
 
 def _power_of_two(n: int) -> int:
@@ -237,3 +232,19 @@ class PlaneTiling(Tiling):
     @property
     def longest_side(self) -> int:
         return max(self.grid.shape)
+
+
+class LineTiling(PlaneTiling):
+    """Square tiles of a plane about one of their pixels, (side/2, side/2), so that offsets are whole pixels."""
+
+    def __init__(self, grid: ImageGrid, side: int) -> None:
+        super().__init__(grid, side)
+        self._cut(side, side)
+        self.radius = side / 2 * self.pixel
+
+    def band(self, index: int) -> tuple[Tiles, np.ndarray | None]:
+        half = self.side // 2
+        columns = np.arange(self.across) * self.side + half
+        references = self.grid.at(np.full(self.across, index * self.side + half), columns) - self.center
+        radius = np.full(self.across, self.radius)
+        return Tiles(self.per_tile, references, radius, np.zeros((6, 0), np.float32), shared=True), None

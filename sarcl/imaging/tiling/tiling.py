@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from ...model.image_grid import ImageGrid
 from ...numerics.tiles import Tiles
-from ...opencl.device import Device
+from ...opencl.device import Buffer, Device
 from ...opencl.launch_numbers import launch_numbers
-from .tree import Tree
-
-if TYPE_CHECKING:
-    from ...opencl.device import Buffer
 
 Run = tuple[int, int]  # bands first ... last - 1
 Orders = Sequence[np.ndarray | None]  # for each band: cell of the band that each point of its tiles is; None: a plane
@@ -72,7 +67,7 @@ class Section:
     orders: Orders
 
 
-class Tiling(ABC):
+class Tiling(Protocol):
     """The tiling of a grid, in bands of tiles. A band is some consecutive rows, or points, of the image.
 
     Fixed by the grid and the side alone, so that results do not depend on how many bands are made at once. Empty
@@ -90,6 +85,9 @@ class Tiling(ABC):
     """
 
     grid: ImageGrid
+    side: int
+    per_tile: int
+    center: np.ndarray
     n_bands: int
     radius: float
     row_shape: tuple[int, ...]
@@ -102,42 +100,33 @@ class Tiling(ABC):
         self.grid, self.side, self.per_tile = grid.filled(), side, side * side
         self.center = grid.bounds.mean(axis=0)
 
-    @abstractmethod
     def extent(self, first: int, last: int) -> slice:
         """Place of bands first ... last - 1 in the flat image (rows of a plane, or points)."""
 
-    @abstractmethod
     def pixels(self, first: int, last: int) -> int:
         """Pixels, padding included, of bands first ... last - 1."""
 
-    @abstractmethod
     def band(self, index: int) -> tuple[Tiles, np.ndarray | None]:
         """Tiles of one band, and their entry of Orders."""
 
-    @abstractmethod
     def tile_sizes(self, first: int, last: int) -> np.ndarray:
         """Pixels, without padding and empty cells, of every tile of bands first ... last - 1."""
 
-    @abstractmethod
     def positions(self, first: int, last: int, orders: Orders) -> np.ndarray:
         """Positions, m (n_tiles, per_tile, 3), of bands first ... last - 1: those of the grid to the bit."""
 
-    @abstractmethod
     def place(self, values: np.ndarray, run: Run, start: int, orders: Orders, flat: FlatImage) -> None:
         """Write values (n,) of tiles from `start` on of a run of bands to their pixels in the flat image.
 
         The tiles are all of the run, or some of a run of one band.
         """
 
-    @abstractmethod
     def outline(self) -> np.ndarray:
         """Sample points, m (n, 3), of the region of all pixels, at which errors are estimated."""
 
-    @abstractmethod
     def tree(self, first: int, last: int, factors: Sequence[int]) -> Tree:
         """Tree over bands first ... last - 1; `factors`: leaves along a side of a tile of each level, the last 1."""
 
-    @abstractmethod
     def parts(self, run: Run, factor: int, most: Callable[[int], int], whole: bool) -> Iterator[Part]:
         """A run of bands in parts of whole roots, or of roots cut to some bands, of `factor` leaves per side.
 
@@ -145,44 +134,34 @@ class Tiling(ABC):
         whole  all can be made at a time
         """
 
-    @abstractmethod
     def sections(self, parts: Iterable[Part], factors: Sequence[int]) -> Iterator[Section]:
         """Parts with their trees; `factors` as of `tree`."""
 
-    @abstractmethod
     def place_section(self, device: Device, sums: Buffer, section: Section, flat: FlatImage) -> None:
         """Write compensated sums (4, pixels) on the device to the pixels of a section in the flat image."""
 
-    @abstractmethod
     def n_roots(self, first: int, last: int, factor: int) -> int:
         """Roots of `factor` leaves per side in bands first ... last - 1."""
 
-    @abstractmethod
     def part_size(self, part: Part, factor: int) -> tuple[int, int]:
         """Roots and pixels, padding included, of a part; of listed points an upper bound of the pixels."""
 
-    @abstractmethod
     def root_bands(self, factor: int) -> int:
         """Bands that a root of `factor` leaves per side reaches over."""
 
-    @abstractmethod
     def root_leaves(self, factor: int, bands: int) -> int:
         """Leaves of a root of `factor` leaves per side, cut to so many bands, at most."""
 
-    @abstractmethod
     def leaf_radius(self, side: int) -> float:
         """Largest distance of a pixel from the centre of a leaf of that side, m, about."""
 
-    @abstractmethod
     def level_radii(self, factors: Sequence[int]) -> list[float]:
         """Largest distance of a pixel from the centre of its tile, m, for each level; `factors` as of `tree`."""
 
-    @abstractmethod
     def child_distance(self, radius: float, below: float) -> float:
         """Largest distance between the centres of a tile of `radius` and of its children, whose radius is `below`."""
 
     @property
-    @abstractmethod
     def longest_side(self) -> int:
         """Pixels along the longer side of the image, about."""
 
@@ -232,3 +211,52 @@ def download_sums(device: Device, sums: Buffer, n: int, kind: type[np.floating] 
         return device.download(pixels, np.empty(n, np.complex64))
     real, imaginary, real_rest, imaginary_rest = device.download(sums, np.empty((4, n), kind))
     return np.asarray((real + real_rest) + 1j * (imaginary + imaginary_rest))
+
+
+@dataclass(frozen=True, eq=False)
+class Tree:
+    """Tiles of every level. The children of a tile are consecutive in the level below.
+
+    centers   for each level: m about the scene's centre (n, 3)
+    children  for each level but the last: number of the first child of each tile, and the end of the last (n + 1,)
+    leaves    tiles of the last level, in its order
+    slot      (n leaves,): number of each leaf among the tiles of its bands
+    """
+
+    centers: tuple[np.ndarray, ...]
+    children: tuple[np.ndarray, ...]
+    leaves: Tiles
+    slot: np.ndarray
+
+    @property
+    def parents(self) -> list[np.ndarray]:
+        """For each level but the first: number of the tile above each tile, int32 (n,)."""
+        return [np.repeat(np.arange(len(c) - 1, dtype=np.int32), np.diff(c)) for c in self.children]
+
+    def leaves_of(self, root: int) -> tuple[int, int]:
+        """First leaf of a root, and one beyond its last."""
+        low, high = root, root + 1
+        for children in self.children:
+            low, high = int(children[low]), int(children[high])
+        return low, high
+
+    def part(self, low: int, high: int) -> Tree:
+        """Roots low ... high - 1, and all tiles below them."""
+        centers, children = [self.centers[0][low:high]], []
+        for below, begins in zip(self.centers[1:], self.children, strict=True):
+            children.append(begins[low : high + 1] - begins[low])
+            low, high = int(begins[low]), int(begins[high])
+            centers.append(below[low:high])
+        return Tree(tuple(centers), tuple(children), self.leaves.picked(np.arange(low, high)), self.slot[low:high])
+
+    def radii(self) -> list[float]:
+        """Largest distance of a point from the centre of its tile, m, for each level."""
+        reach = self.leaves.radius
+        out = [float(reach.max())]
+        for level in range(len(self.children) - 1, -1, -1):
+            starts = self.children[level]
+            parent = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
+            distance = np.linalg.norm(self.centers[level + 1] - self.centers[level][parent], axis=1) + reach
+            reach = np.maximum.reduceat(distance, starts[:-1])
+            out.append(float(reach.max()))
+        return out[::-1]

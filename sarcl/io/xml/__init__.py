@@ -5,5 +5,3 @@ For other folders:
     parser           elements of a file without a document type
     virtual_rasters  sources of virtual rasters (VRT), where all else they hold is known to be harmless
 """
-
-__all__ = ["parser", "virtual_rasters"]

@@ -22,11 +22,8 @@ THIN = 5  # every fifth position is plotted
 
 def steady(lab: Lab) -> Section:
     """Figures 5.3 to 5.5."""
-    out = Section("steady", "Apparent apertures without the switch (table 5.2, figures 5.3 to 5.5)")
-    out.say(
-        "The mapping displaces the whole aperture along the track by d f0/df, with the sign of the step. Length and "
-        "nulls stay the same."
-    )
+    out = Section.of("farooq", "steady")
+    out.say()
     curves = []
     for n, step, figure in ((45, 20e6, "5.3"), (450, 2e6, "5.4"), (450, -2e6, "5.5")):
         if not lab.small_enough(n):
@@ -34,28 +31,19 @@ def steady(lab: Lab) -> Section:
         case, name = system(n, step, mirrored=False), f"N {n}, {step / 1e6:+g} MHz"
         actual, mapped = lab.mapped(case, "corrected"), lab.mapped(case, "apparent")
         y = mapped.tx[:, 1]
-        out.number(f"{name}: length", f"figure {figure}", 430.0, float(np.ptp(y)), 0.5, "m", ".1f")
+        out.words = {"name": name, "figure": figure}
+        out.number("{name}: length", float(np.ptp(y)))
         shift = float((y - actual.tx[:, 1]).mean())
         direction = "negative" if step > 0 else "positive"
         if n > 45:
-            out.states(
-                f"{name}: places are moved", f"figure {figure}", f"in the {direction} direction", f"by {shift:+.1f} m",
-                (shift < 0) == (step > 0), value=shift,
-                rule="the mean displacement has that sign",
-            )  # fmt: skip
+            out.states("{name}: places are moved", shift, (shift < 0) == (step > 0), direction=direction)
         nulls = [lab.measure(raw)["null"] for raw in (actual, mapped)]
         remark = "" if step > 0 else (
             f"the mapping changes nothing, but the centre frequency is now {case.middle / 1e9:.2f} GHz (section "
             f"5.3.1), whose wave resolves {case.null:.3f} m over 430 m; figure 5.5 wants f0 moved as well"
         )  # fmt: skip
-        item = f"{name}: nulls in cross-range"
-        out.number(item, f"figure {figure}", PRINTED, nulls[1], 0.002, "m", why=remark, cause="error in print")
-        item = f"{name}: nulls before and after the mapping"
-        measured = f"{nulls[0]:.4f} and {nulls[1]:.4f} m"
-        rule = "difference below 2 mm"
-        out.states(
-            item, f"figure {figure}", "unchanged", measured, abs(nulls[0] - nulls[1]) < 0.002, value=nulls, rule=rule
-        )
+        out.number("{name}: nulls in cross-range", nulls[1], expected=PRINTED, why=remark)
+        out.states("{name}: nulls before and after the mapping", nulls, abs(nulls[0] - nulls[1]) < 0.002)
         curves.append((name, actual.tx[::THIN, 1], y[::THIN]))
         if n == 45:
             curves.insert(0, ("actual", actual.tx[::THIN, 1], actual.tx[::THIN, 1]))
@@ -63,19 +51,14 @@ def steady(lab: Lab) -> Section:
             lab.picture(lab.mapped(case, "apparent", DIAMOND), f"{name}, mapped (figure {figure})."),
             lab.picture(mapped, f"{name}: the centre point in a box of 0.167 m (figure {figure}).", ZOOM, PRINTED),
         )
-    out.plot(curves, "actual position, m", "position backprojected from, m", "Positions along the track.", dots=True)
+    out.plot("Positions along the track", curves, dots=True)
     return out
 
 
 def switched(lab: Lab) -> Section:
     """Figures 5.6 to 5.8."""
-    out = Section("switched", "Apparent apertures with the sign switched at mid-aperture (figures 5.6 to 5.8)")
-    out.say(
-        "The two halves of the aperture are displaced in opposite directions, which opens a gap of 2 d f0/df between "
-        "them. The printed lengths follow with d half a wavelength of the centre frequency, f0 = 10 GHz in both "
-        "halves, and the range offset of equation 5.15 as printed. That offset uses the two-way path c dt as a "
-        "one-way range; half of it, which is right, makes half the growth."
-    )
+    out = Section.of("farooq", "switched")
+    out.say()
     curves, table = [], []
     for n, step, length, growth, _, figure in SWITCHED:
         if not lab.small_enough(n):
@@ -87,25 +70,21 @@ def switched(lab: Lab) -> Section:
         wide = float(np.ptp(lab.mapped(other, "apparent").tx[:, 1]))
         lengths = {o: float(np.ptp(m.tx[:, 1])) for o, m in mapped.items()}
         length_by_paper = lengths["published"]
-        out.number(f"{name}: apparent length", figure, length, length_by_paper, 1.0, "m", ".1f")
-        out.number(f"{name}: longer by", figure, growth, 100 * (length_by_paper / case.aperture - 1), 0.6, "%", ".1f")
+        growth_by_paper = 100 * (length_by_paper / case.aperture - 1)
+        out.words = {"name": name}
+        out.number("{name}: apparent length", length_by_paper, source=figure, expected=length)
+        out.number("{name}: longer by", growth_by_paper, source=figure, expected=growth)
         table.append([name, f"{length:.0f}", f"{length_by_paper:.1f}", f"{wide:.1f}", f"{lengths['halved']:.1f}"])
-        out.keep(
-            **{
-                name: {
-                    "printed": length,
-                    "half a wave of fc": length_by_paper,
-                    "d 0.015 m": wide,
-                    "halved": lengths["halved"],
-                }
-            }
-        )
+        named = {
+            "printed": length,
+            "half a wave of fc": length_by_paper,
+            "d 0.015 m": wide,
+            "halved": lengths["halved"],
+        }
+        out.keep(**{name: named})
         gap = float(np.diff(mapped["published"].tx[:, 1]).max())
         if n == 45:
-            expected = "no longer continuous"
-            measured = f"gap of {gap:.1f} m"
-            rule = "gap above twice the step of the track"
-            out.states("switched aperture", figure, expected, measured, gap > 2 * _step(raw.tx), value=gap, rule=rule)
+            out.states("switched aperture", gap, gap > 2 * _step(raw.tx), source=figure)
             _outer(out, lab, figure)
             curves.append(("actual", raw.tx[::THIN, 1], raw.tx[::THIN, 1]))
         curves.append((name, raw.tx[::THIN, 1], mapped["published"].tx[::THIN, 1]))
@@ -115,9 +94,8 @@ def switched(lab: Lab) -> Section:
                 mapped["published"], f"{name}: the centre point in a box of 0.167 m ({figure}).", ZOOM, PRINTED
             ),
         )
-    head = ["length, m", "printed", "d 14.36 mm", "d 15 mm", "offset halved"]
-    out.table(head, table)
-    out.plot(curves, "actual position, m", "position backprojected from, m", "Positions along the track.", dots=True)
+    out.table("Lengths of the apertures", table)
+    out.plot("Positions along the track", curves, dots=True)
     return out
 
 
@@ -127,16 +105,12 @@ def _outer(out: Section, lab: Lab, figure: str) -> None:
     inner, outer = (
         lab.measure(lab.mapped(case, "apparent", ((0.0, y, 0.0),)), half=0.9, about=y)["pslr_db"] for y in (0.0, 2.0)
     )
-    item = "side lobes of the outer targets"
-    measured = f"PSLR {outer:.1f} dB 2 m off the centre, {inner:.1f} dB at it"
-    why = "points off the centre are measured again below"
-    rule = "PSLR more than 1 dB higher than at the centre"
-    out.states(item, figure, "most noticeable there", measured, outer > inner + 1, why, [outer, inner], rule=rule)
+    out.states("side lobes of the outer targets", [outer, inner], outer > inner + 1, source=figure)
 
 
 def nulls(lab: Lab) -> Section:
     """The nulls of the centre point, sections 5.3.1 and figures 5.6 to 5.8."""
-    out = Section("nulls", "Nulls of the mapped centre point (equation 5.36, figures 5.6 to 5.8)")
+    out = Section.of("farooq", "nulls")
     curves = []
     for n, step, _, _, expected, figure in SWITCHED:
         if not lab.small_enough(n):
@@ -144,28 +118,21 @@ def nulls(lab: Lab) -> Section:
         case, name = system(n, step), f"N {n}, +-{step / 1e6:g} MHz"
         mapped = lab.mapped(case, "apparent")
         response = lab.measure(mapped)
-        text = f"{response['null']:.3f} m, PSLR {response['pslr_db']:.1f} dB"
-        value = [response["null"], response["pslr_db"]]
+        null, pslr = response["null"], response["pslr_db"]
         if expected is None:
-            out.states(f"{name}: nulls", figure, "no difference visible", text, abs(response["null"] - PRINTED) < 0.017,
-                       "6 % closer to the peak", value,
-                rule="within 17 mm of 0.167 m")  # fmt: skip
+            holds = abs(null - PRINTED) < 0.017
+            out.states("{name}: nulls", [null, pslr], holds, source=figure, name=name)
         else:
             uniform = SPEED_OF_LIGHT / case.middle * case.distance / (2 * np.ptp(mapped.tx[:, 1]))
-            out.states(
-                f"{name}: nulls", f"{figure}, equation 5.36", f"{expected:.3f} m", text,
-                abs(response["null"] - expected) < 0.003,
-                f"an aperture of this length without a gap has {uniform:.3f} m; two halves with a gap are an "
-                "interferometer, whose nulls are closer to the peak and whose side lobes are higher", value,
-                rule="within 3 mm", cause="interpretation",
-            )  # fmt: skip
+            words = {"name": name, "figure": figure, "printed": expected, "uniform": uniform}
+            out.states("{name}: nulls of two halves", [null, pslr], abs(null - expected) < 0.003, **words)
         places, values = lab.cut(mapped, half=1.0, n=401)
         curves.append((name, places, decibels(values)))
     plain = system(45, 20e6, mirrored=False)
     places, values = lab.cut(lab.mapped(plain, "corrected"), half=1.0, n=401)
     curves.insert(0, ("not mapped", places, decibels(values)))
-    out.say("Cross-range cuts through the centre point. Equation 5.36 assumes that the mapped aperture has no gap.")
-    out.plot(curves, "cross-range, m", "dB", "The centre point (figures 5.6 to 5.8).")
+    out.say()
+    out.plot("The centre point", curves)
     return out
 
 

@@ -18,12 +18,8 @@ PRINTED = 0.35  # ns, figures 4.11 and 4.12
 
 def delays(lab: Lab) -> Section:
     """Equation 4.27, figures 4.10 to 4.12."""
-    out = Section("delay", "A delay that depends on azimuth (equation 4.27, figures 4.10 to 4.12)")
-    out.say(
-        "The peak of the closed form is delayed by d f0 sin(azimuth)/(c df). The closed form leaves out the phase "
-        "n^2 dk d sin(azimuth). Its part n (N - 1) is linear in n and moves the peak of the exact field to "
-        "(f0 + (N - 1) df) d sin(azimuth)/(c df); the rest smears it."
-    )
+    out = Section.of("farooq", "delay")
+    out.say()
     array = AntennaArray.linear(N, spacing=-HALF_WAVE, frequency_step=STEP)
     t = np.linspace(-0.5e-9, 0.5e-9, 4001)
     curves, exact_curves = [], []
@@ -38,20 +34,14 @@ def delays(lab: Lab) -> Section:
         if degrees:
             delay = 1e9 * t[level.argmax()]
             figure = "4.11" if degrees > 0 else "4.12"
-            item = f"delay of the peak at {degrees:+d} deg, closed form"
-            out.number(item, f"figure {figure}, equation 4.27", PRINTED * np.sign(degrees), delay, 0.004, "ns", "+.4f")
+            out.words = {"degrees": degrees, "figure": figure}
+            out.number("delay of the peak at {degrees:+d} deg, closed form", delay, expected=PRINTED * np.sign(degrees))
     peak = float(exact_curves[2][2].max())
     bound = closed.quadratic_phase(shape=(N, 1), spacing=(HALF_WAVE, 0), frequency_step=(STEP, 0), cosines=(1, 0))
-    out.states(
-        "the same in the exact field: a peak at +45 deg", "figure 4.11", "a peak as high as at boresight",
-        f"{peak:.2f} of {N}", peak > 0.9 * N,
-        f"the phase left out is {bound / (np.pi / 4):.0f} times what equation 3.40 allows: the carriers are never in "
-        "phase there", peak,
-        rule="above 0.9 N", cause="interpretation",
-    )  # fmt: skip
+    out.states("the same in the exact field: a peak at +45 deg", peak, peak > 0.9 * N, n=N, ratio=bound / (np.pi / 4))
     _systems(out, lab)
-    out.plot(curves, "t', ns", "modulus", "Closed form in three directions (figures 4.10 to 4.12).")
-    out.plot(exact_curves, "t', ns", "modulus", "The exact field in the same directions.")
+    out.plot("Closed form in three directions", curves)
+    out.plot("The exact field in the same directions", exact_curves)
     return out
 
 
@@ -69,27 +59,20 @@ def _systems(out: Section, lab: Lab) -> None:
         modulus = np.abs(beam(array, F0, times=times, positions=positions, device=lab.device))[:, 0]
         delay = float(t[modulus.argmax()])
         offset = SPEED_OF_LIGHT / 2 * (delay - plain)
+        longer = delay / plain
+        out.words = {"n": n, "mhz": step / 1e6, "ns": 1e9 * delay, "printed_ns": 1e9 * plain, "range_mm": 1e3 * offset}
         out.states(
-            f"delay at the aperture's end, N {n}, {step / 1e6:g} MHz", "equation 4.27", f"{1e9 * plain:.4g} ns by it",
-            f"{1e9 * delay:.4g} ns, {100 * (delay / plain - 1):.1f} % more", abs(delay / plain - 1) < 0.02,
-            f"the delay follows with f0 + (N - 1) df; {1e3 * offset:.0f} mm of range, the resolution is 167 mm",
-            delay / plain,
-            rule="within 2 %", cause="interpretation",
-        )  # fmt: skip
+            "delay at the aperture's end, N {n}, {mhz:g} MHz", longer, abs(longer - 1) < 0.02, more=100 * (longer - 1)
+        )
         rows.append([f"N {n}, {step / 1e6:g} MHz", f"{delay / plain:.4f}", f"{predicted / plain:.4f}",
                      f"{1e3 * offset:.0f}", f"{modulus.max() / n:.4f}"])  # fmt: skip
-    head = ["215 m along, 5 km away", "delay over (4.27)", "f0 + (N - 1) df", "range, mm", "peak over N"]
-    out.table(head, rows)
+    out.table("Delays of the systems", rows)
 
 
 def snapshots(lab: Lab) -> Section:
     """Figures 4.9 and 4.13: the travelling pulse over a plane."""
-    out = Section("snapshots", "The pulse on its way (figures 4.9 and 4.13)")
-    out.say(
-        "Modulus of the field of 9 elements at (0, -n d), limited to the length of the pulse. In the closed form the "
-        "brightest line is late on one side of boresight and early on the other: surfaces of equal amplitude are not "
-        "surfaces of equal phase. The exact field is bright about boresight only, where the carriers are in phase."
-    )
+    out = Section.of("farooq", "snapshots")
+    out.say()
     x, y = np.linspace(0.0, 1.6, 161), np.linspace(-1.2, 1.2, 241)
     place = np.stack([*np.meshgrid(x, y, indexing="ij"), np.zeros((len(x), len(y)))], axis=-1)
     distance = np.linalg.norm(place, axis=-1)
@@ -101,16 +84,14 @@ def snapshots(lab: Lab) -> Section:
         retarded = t - distance / SPEED_OF_LIGHT
         gate = np.abs(retarded) <= 0.5 / STEP
         exact = np.abs(beam(array, F0, times=t, positions=place, device=lab.device)) * gate
-        y_name = f"Exact field, {ns} ns after the pulse left."
-        out.picture(decibels(exact / N, -60), *edges, "cross-range, m", "range, m", y_name, floor_db=-15)
+        out.picture("Exact field", decibels(exact / N, -60), *edges, floor_db=-15, words={"ns": ns})
         if ns == 2:
             level = np.abs(
                 closed.waveform(F0, N, spacing=-HALF_WAVE, frequency_step=STEP, azimuth=azimuth, retarded=retarded)
             )
             late = out.parts.pop()
             out.draw(late)
-            y_name = "Closed form, 2 ns: what figure 4.9 shows."
-            out.picture(decibels(level * gate / N, -60), *edges, "cross-range, m", "range, m", y_name, floor_db=-15)
+            out.picture("Closed form", decibels(level * gate / N, -60), *edges, floor_db=-15)
             _orders(out, level * gate, distance, azimuth)
             _normals(out, decibels(level * gate / N, -60), edges)
     return out
@@ -128,16 +109,12 @@ def _normals(out: Section, level: np.ndarray, edges: tuple[tuple[float, float], 
     radial = at / np.linalg.norm(at)
     across = np.array([along[1], -along[0]]) / np.linalg.norm(along)
     apart = float(np.degrees(np.arccos(np.clip(radial @ across, -1, 1))))
-    item = "directions of uniform phase and of uniform amplitude at 30 deg, 2 ns"
-    out.states(
-        item, "figure 4.13", "they differ", f"by {apart:.0f} deg", apart > 5, value=apart, rule="by more than 5 deg"
-    )
+    out.states("directions of uniform phase and of uniform amplitude at 30 deg, 2 ns", apart, apart > 5)
     rays = [
         (name, [at[1], at[1] + 0.4 * d[1]], [at[0], at[0] + 0.4 * d[0]])
         for name, d in (("normal of uniform phase", radial), ("normal of uniform amplitude", across))
     ]
-    y_name = "Closed form, 2 ns, with two normals at 30 deg (figure 4.13)."
-    out.picture(level, *edges, "cross-range, m", "range, m", y_name, floor_db=-15, lines=rays)
+    out.picture("Closed form normals", level, *edges, floor_db=-15, lines=rays)
 
 
 def _orders(out: Section, level: np.ndarray, distance: np.ndarray, azimuth: np.ndarray) -> None:
@@ -148,8 +125,8 @@ def _orders(out: Section, level: np.ndarray, distance: np.ndarray, azimuth: np.n
         near = np.where(np.abs(azimuth - np.radians(degrees)) < 0.02, level, 0)
         places.append(float(distance.flat[int(near.argmax())] - middle))
     out.states(
-        "brightest place at -45, 0, 45 deg, 2 ns", "figure 4.9", "early, centred, late in the pulse",
-        ", ".join(f"{1e2 * p:+.1f} cm" for p in places), places[0] > 0.05 > abs(places[1]) and places[2] < -0.05,
-        "distances from the middle of the pulse along range; the late part is at the shorter range", places,
-        rule="over 5 cm early, within 5 cm, over 5 cm late",
-    )  # fmt: skip
+        "brightest place at -45, 0, 45 deg, 2 ns",
+        places,
+        places[0] > 0.05 > abs(places[1]) and places[2] < -0.05,
+        measured=", ".join(f"{1e2 * p:+.1f} cm" for p in places),
+    )

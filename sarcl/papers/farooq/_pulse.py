@@ -21,51 +21,41 @@ BORESIGHT = ((1.0, 0.0, 0.0),)
 
 def waveform(lab: Lab) -> Section:
     """Figures 4.1 to 4.5."""
-    out = Section("waveform", "The pulse of 9 elements in steps of 1 GHz (table 4.1, figures 4.1 to 4.5)")
+    out = Section.of("farooq", "waveform")
     array = AntennaArray.linear(N, spacing=-HALF_WAVE, frequency_step=STEP)
     t = np.linspace(-0.5e-9, 1.5e-9, 4001)
     field = beam(array, F0, times=FAR / SPEED_OF_LIGHT + t, positions=FAR * np.array(BORESIGHT), device=lab.device)
     level = np.abs(field[:, 0])
     half = len(t) // 2
     first, second = t[level[:half].argmax()], t[half + int(level[half:].argmax())]
-    out.number("period", "figure 4.2", 1.0, 1e9 * (second - first), 1e-3, "ns")
+    out.number("period", 1e9 * (second - first))
     lobe = level[(t > 0) & (t < 0.5e-9)]
     null = t[t > 0][int((np.diff(lobe) > 0).argmax())]  # where it first rises again
-    out.number("main lobe, null to null", "figure 4.3, equation 4.14", 2 / (N * STEP) * 1e9, 2e9 * null, 3e-3, "ns")
+    out.number("main lobe, null to null", 2e9 * null, expected=2 / (N * STEP) * 1e9)
     slow = AntennaArray.linear(N, spacing=-HALF_WAVE, frequency_step=1e3)
     flat = np.abs(
         beam(slow, F0, times=FAR / SPEED_OF_LIGHT + t, positions=FAR * np.array(BORESIGHT), device=lab.device)
     )
     ripple = float(np.ptp(flat) / N)
-    item = "1 kHz steps: modulation over 2 ns"
-    rule = "below 0.001 of the peak"
-    out.states(item, "figure 4.1", "none", f"{ripple:.1e} of the peak", ripple < 1e-3, value=ripple, rule=rule)
+    out.states("1 kHz steps: modulation over 2 ns", ripple, ripple < 1e-3)
     f, channels, total = spectra()
     middle = float((f * total**2).sum() / (total**2).sum())
-    out.number("centre frequency of the pulse", "figure 4.5, equation 4.6", 14.0, middle / 1e9, 0.1, "GHz", ".2f")
+    out.number("centre frequency of the pulse", middle / 1e9)
     # Energy within a band of N df about the middle; the tails of the outer tones lie outside.
     inside = np.abs(f - 14e9) <= N * STEP / 2
     share = float((total[inside] ** 2).sum() / (total**2).sum())
-    measured = f"{100 * share:.1f} % of the energy lies within 9 GHz"
-    rule = "more than 95 % of the energy"
-    out.states("bandwidth", "figure 4.5, equation 4.18", "9 GHz", measured, share > 0.95, value=share, rule=rule)
+    out.states("bandwidth", share, share > 0.95, percent=100 * share)
     crossing = 20 * np.log10(float(channels[0][np.isclose(f, F0 + STEP / 2, atol=2e6)].max()))
-    item = "neighbouring channels cross"
-    out.states(
-        item, "figure 4.4", "below 3 dB", f"{crossing:.2f} dB", crossing < -3, value=crossing, rule="below -3 dB"
-    )
-    out.say(
-        "Exact field at boresight. A pulse as long as the period has one peak; its spectrum is nine tones side by side."
-    )
+    out.states("neighbouring channels cross", crossing, crossing < -3)
+    out.say()
     shown = (f >= 7e9) & (f <= 21e9)
-    out.plot([("1 GHz", 1e9 * t, field[:, 0].real)], "t', ns", "field", "The wave, real part (figure 4.2).")
-    caption = "Its modulus (figure 4.3), and with steps of 1 kHz (figure 4.1)."
-    out.plot([("1 GHz", 1e9 * t, level), ("1 kHz", 1e9 * t, flat[:, 0])], "t', ns", "modulus", caption)
-    out.plot([(f"{(F0 + i * STEP) / 1e9:g} GHz", f[shown] / 1e9, decibels(c[shown]))
-               for i, c in enumerate(channels)],
-              "frequency, GHz", "dB", "Spectra of the channels (figure 4.4).")  # fmt: skip
-    caption = "Spectrum of the pulse (figure 4.5)."
-    out.plot([("sum", f[shown] / 1e9, decibels(total[shown] / total.max()))], "frequency, GHz", "dB", caption)
+    out.plot("The wave", [("1 GHz", 1e9 * t, field[:, 0].real)])
+    out.plot("Its modulus", [("1 GHz", 1e9 * t, level), ("1 kHz", 1e9 * t, flat[:, 0])])
+    out.plot(
+        "Spectra of the channels",
+        [(f"{(F0 + i * STEP) / 1e9:g} GHz", f[shown] / 1e9, decibels(c[shown])) for i, c in enumerate(channels)],
+    )
+    out.plot("Spectrum of the pulse", [("sum", f[shown] / 1e9, decibels(total[shown] / total.max()))])
     out.keep(modulus={"ns": 1e9 * t[::20], "modulus": level[::20]})
     return out
 
@@ -84,7 +74,7 @@ def spectra() -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
 
 def ambiguities(lab: Lab) -> Section:
     """Figures 4.6 to 4.8."""
-    out = Section("ambiguity", "Ambiguity of a chirp and of the tones (figures 4.6 to 4.8)")
+    out = Section.of("farooq", "ambiguity")
     length, band = 1 / STEP, N * STEP
     t = (np.arange(round(length * RATE)) - (round(length * RATE) - 1) / 2) / RATE
     chirp = ambiguity(np.exp(1j * np.pi * band / length * t**2), RATE, max_doppler=band / 2)
@@ -93,37 +83,26 @@ def ambiguities(lab: Lab) -> Section:
     shifts = np.abs(chirp.dopplers) < band / 3
     moved, stays = (np.abs(a.delay_of_peak()[shifts]).max() * RATE for a in (chirp, tones))
     fit = float(np.polyfit(chirp.dopplers[shifts], chirp.delay_of_peak()[shifts], 1)[0] * slope)
-    item = "chirp: delay of the peak with Doppler"
-    measured = f"{fit:.3f} of nu T/B; up to {moved:.0f} samples"
-    rule = "within 5 % of nu T/B"
-    out.states(item, "figure 4.6", "range-Doppler coupling", measured, abs(fit - 1) < 0.05, value=fit, rule=rule)
-    item = "tones: delay of the peak, |nu| < 3 GHz"
-    measured = f"{stays:.0f} of {len(t)} samples"
-    out.states(item, "figure 4.7", "no coupling", measured, stays <= 1.01, value=stays, rule="at most one sample")
+    out.states("chirp: delay of the peak with Doppler", fit, abs(fit - 1) < 0.05, moved=moved)
+    out.states("tones: delay of the peak, |nu| < 3 GHz", stays, stays <= 1.01, n=len(t))
     ridge = _ridge(tones, slope, length)
-    item = "tones: largest value on the chirp's ridge"
-    measured = f"{ridge:.2f}, where the chirp has {_ridge(chirp, slope, length, np.min):.2f} or more"
-    out.states(item, "figure 4.7", "no ridge", measured, ridge < 0.25, value=ridge, rule="below 0.25")
+    out.states(
+        "tones: largest value on the chirp's ridge", ridge, ridge < 0.25, least=_ridge(chirp, slope, length, np.min)
+    )
     cuts = [(name, a.magnitude[:, int(np.abs(a.dopplers).argmin())]) for name, a in (("FDA", tones), ("LFM", chirp))]
     nulls = [1e9 * tones.delays[tones.delays > 0][int((np.diff(c[tones.delays > 0]) > 0).argmax())] for _, c in cuts]
-    item = "first nulls of both without Doppler"
-    expected = "similar range resolution"
-    measured = f"{nulls[0]:.3f} and {nulls[1]:.3f} ns"
-    rule = "difference below 0.03 ns"
-    out.states(item, "figure 4.8", expected, measured, abs(nulls[0] - nulls[1]) < 0.03, value=nulls, rule=rule)
-    out.say(
-        "Both last 1 ns and have a bandwidth of 9 GHz. With the chirp a Doppler shift becomes a range error (the "
-        "ridge). With the tones the peak stays, but a plateau covers the plane: the volume is 1 for both."
-    )
+    out.states("first nulls of both without Doppler", nulls, abs(nulls[0] - nulls[1]) < 0.03)
+    out.say()
     for name, a, figure in (("LFM", chirp, "4.6"), ("FDA", tones, "4.7")):
         out.picture(
-            decibels(a.magnitude.T, -80), (1e9 * a.delays[0], 1e9 * a.delays[-1]),
-            (a.dopplers[0] / 1e9, a.dopplers[-1] / 1e9), "delay, ns", "Doppler, GHz",
-            f"{name}: modulus of the ambiguity function (figure {figure}).", floor_db=-30,
-        )  # fmt: skip
-    out.plot(
-        [(name, 1e9 * tones.delays, c) for name, c in cuts], "delay, ns", "modulus", "Without Doppler (figure 4.8)."
-    )
+            "Modulus of the ambiguity function",
+            decibels(a.magnitude.T, -80),
+            (1e9 * a.delays[0], 1e9 * a.delays[-1]),
+            (a.dopplers[0] / 1e9, a.dopplers[-1] / 1e9),
+            floor_db=-30,
+            words={"name": name, "figure": figure},
+        )
+    out.plot("Without Doppler", [(name, 1e9 * tones.delays, c) for name, c in cuts])
     return out
 
 

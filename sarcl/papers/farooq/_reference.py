@@ -18,7 +18,7 @@ DIAMOND = tuple((float(x), float(y), 0.0) for x in range(-2, 3) for y in range(-
 
 def section(lab: Lab) -> Section:
     """Figures 2.13 to 2.16."""
-    out = Section("reference", "The reference image: a chirp and a tone (table 2.1, figures 2.11 to 2.16)")
+    out = Section.of("farooq", "reference")
     case = Case("table 2.1", aperture=LENGTH, n_pulses=451, distance=DISTANCE)
     chirp = Waveform.chirp(center=F0, bandwidth=BAND, duration=1e-6)
     # 16 lobes of the spectrum: the triangle is right to 2 % of its peak.
@@ -30,22 +30,18 @@ def section(lab: Lab) -> Section:
         for axis, way in enumerate(curves):
             curves[way][name] = lab.cut(point, axis, 0.8, 801)
             null = lab.measure(point, axis)["null"]
-            out.number(f"{name}: first null in {way}", "table 2.1", PRINTED, null, 0.002, "m")
+            out.number("{name}: first null in {way}", null, expected=PRINTED, name=name, way=way)
         caption = f"{name}: 13 points (figure {'2.13' if name == 'LFM' else '2.14'})."
         figures.append(lab.picture(lab.single(case, waveform, DIAMOND), caption))
     _shapes(out, curves)
-    out.say(
-        "One antenna, first with a chirp, then with a short pulse of one frequency, both with a bandwidth of 900 MHz. "
-        "The positions of the 13 points cannot be read in the scan of figure 2.11: here they are a diamond, 1 m apart. "
-        "(The paper calls the centre point Target #6, so its arrangement was different.)"
-    )
+    out.say()
     out.draw(*figures)
     for figure, (way, response) in zip(("2.15", "2.16"), curves.items(), strict=True):
         out.plot(
+            "Cut through the centre point along {way}",
             [(name, places, values / values.max()) for name, (places, values) in response.items()],
-            f"{way}, m",
-            "modulus",
-            f"Cut through the centre point along {way} (figure {figure}).",
+            way=way,
+            figure=figure,
         )
         out.keep(**{f"{way} {name}": {"m": places[::4], "modulus": v[::4]} for name, (places, v) in response.items()})
     return out
@@ -57,17 +53,11 @@ def _shapes(out: Section, curves: dict[str, dict[str, tuple[np.ndarray, np.ndarr
     for name, law, wanted in (("LFM", "sinc", _sinc), ("tone", "triangular", _triangle)):
         at, values = curves["range"][name]
         off = float(np.abs(values / values.max() - wanted(at / cell)).max())
-        item = f"{name}: shape of the range response"
-        measured = f"{law} to {off:.3f} of the peak"
-        out.states(item, "figure 2.15", law, measured, off < 0.05, value=off, rule="within 0.05 of the peak")
+        out.states("{name}: shape of the range response", off, off < 0.05, expected=law, name=name, law=law)
     at, chirp = curves["cross-range"]["LFM"]
     tone = curves["cross-range"]["tone"][1]
     off = float(np.abs(chirp / chirp.max() - tone / tone.max()).max())
-    measured = f"differ by {off:.3f} of the peak"
-    rule = "difference below 0.05 of the peak"
-    out.states(
-        "cross-range responses of both", "figure 2.16", "nearly identical", measured, off < 0.05, value=off, rule=rule
-    )
+    out.states("cross-range responses of both", off, off < 0.05)
 
 
 def _sinc(x: np.ndarray) -> np.ndarray:

@@ -23,41 +23,25 @@ FLOOR = -60.0  # dB, lowest level plotted
 
 def section(lab: Lab) -> Section:
     """Isolation of four zones; how it depends on the carrier step and on the direction."""
-    out = Section("zones", "Range zones separated by carriers that continue from pulse to pulse")
+    out = Section.of("farooq", "zones")
     radar = RangeZones()
+    step, prf, depth = radar.step / 1e3, radar.prf / 1e3, radar.depth / 1e3
+    out.say("principle", radar=radar, step=step, prf=prf, depth=depth, cycles=step / prf)
     systems = {"running carriers": radar, "one carrier": replace(radar, step=0.0)}
     places = np.linspace(-70, 70, 281)
     for name, system in systems.items():
         cuts = cuts_of(system, places, lab.device)
         levels = matrix(system, lab.device)
         title = f"{name[0].upper()}{name[1:]}"
-        out.say(
-            f"{title}: level of each zone's point, alone, in the image of every zone, relative to its own zone, dB."
-        )
-        out.table(
-            ["", *(f"image of zone {q}" for q in range(ZONES))],
-            [[f"point of zone {p}", *(f"{round(v, 1) + 0.0:.1f}" for v in row)] for p, row in enumerate(levels)],
-        )
+        out.say("levels", title=title)
+        rows = [[f"point of zone {p}", *(f"{round(v, 1) + 0.0:.1f}" for v in row)] for p, row in enumerate(levels)]
+        out.draw(html.table(["", *(f"image of zone {q}" for q in range(ZONES))], rows))
         curves = [(f"zone {q}", places, decibels(c, FLOOR)) for q, c in enumerate(cuts)]
-        out.plot(
-            curves, "behind the zone's centre, m", "dB", f"{title}: images of the four zones, from one record. Hamming."
-        )
+        out.plot("Images of the four zones", curves, title=title)
         off = levels[~np.eye(ZONES, dtype=bool)]
         out.keep(**{name: {"levels_db": levels, "best_other_db": off.min(), "worst_other_db": off.max()}})
     _sweeps(out, radar, lab)
-    out.parts.insert(0, html.words(
-        f"{radar.n} elements send carriers {radar.step / 1e3:g} kHz apart at a PRF of {radar.prf / 1e3:g} kHz: "
-        f"{radar.step / radar.prf:g} cycles per pulse, a quarter cycle beyond a whole number. Echoes from "
-        f"{radar.depth / 1e3:.0f} km farther arrive one pulse later, with a phase that advances by a quarter cycle per "
-        "element: over the elements four zones are orthogonal. Each zone holds one point; the receiver records their "
-        "sum; every zone is focused from that record. With equal carriers the zones overlap. This is not claimed in "
-        "the paper: an array with one carrier cannot do it."
-    ))  # fmt: skip
-    out.say(
-        "The cost: the receiver must separate at least as many elements as there are zones, and the directions must be "
-        "known. An echo from another direction has a phase that advances over the elements by itself; 30 degrees off, "
-        "with elements half a wavelength apart, that is a quarter cycle per element and the next zone is not rejected."
-    )
+    out.say()
     return out
 
 
@@ -108,13 +92,8 @@ def _sweeps(out: Section, radar: RangeZones, lab: Lab) -> None:
         clear = np.array(same) > FLOOR
         error = float(np.abs(np.array(measured) - same)[clear].max())
         out.keep(**{name: {"at": x, "measured_db": measured, "predicted_db": same, "largest_error_db": error}})
-        out.plot(
-            [("predicted", xs, np.maximum(predicted, FLOOR)), ("measured", x, np.maximum(measured, FLOOR))],
-            axis,
-            "dB",
-            f"The next zone's point in zone 0's image, against {name}; largest difference {error:.2f} dB.",
-            dots=("measured",),
-        )
+        curves = [("predicted", xs, np.maximum(predicted, FLOOR)), ("measured", x, np.maximum(measured, FLOOR))]
+        out.plot("Isolation of the next zone", curves, dots=("measured",), axis=axis, name=name, error=error)
 
 
 def _image(

@@ -44,7 +44,7 @@ CASES = {
 
 def section(lab: Lab) -> Section:
     """Figure 12 a to d, each with the grey levels of the lower left patch."""
-    out = Section("patches", "22 patches of different materials (figure 12)")
+    out = Section.of("saras", "patches")
     field = FIELD[lab.quick]
     number, electric = patches(field)
     radar = replace(FLAT, n_pulses=round(1.3 * field[0]))
@@ -73,31 +73,15 @@ def section(lab: Lab) -> Section:
             if is_rejected
         ]
         verdict = f"Rayleigh rejected by {' and by '.join(rejected)}" if rejected else "Rayleigh not rejected"
-        out.states(
-            f"case {name}, {case.words}: grey levels",
-            f"figure 12 {name}",
-            "Rayleigh" if case.rayleigh else "not Rayleigh",
-            f"{verdict}: contrast {statistics.contrast:.2f}, p = {statistics.rayleigh:.2g}, {len(amplitude)} pixels",
-            (not rejected) == case.rayleigh,
-            value=[statistics.rayleigh, statistics.contrast],
-            rule=f"Rayleigh is rejected by p of at most {SIGNIFICANT:g} ({TEST}), or by a contrast more than "
-            f"{STANDARD_ERRORS:g} standard errors, 1/sqrt(n) for n pixels, from 1",
-        )
+        out.words = {"name": name, "statistics": case.words, "verdict": verdict, "n": len(amplitude),
+                     "significant": SIGNIFICANT, "test": TEST, "standard_errors": STANDARD_ERRORS}  # fmt: skip
+        value, expected = [statistics.rayleigh, statistics.contrast], "Rayleigh" if case.rayleigh else "not Rayleigh"
+        out.states("case {name}, {statistics}: grey levels", value, (not rejected) == case.rayleigh, expected=expected)
         bins, density = histogram(amplitude / np.sqrt((amplitude**2).mean()), 3.0, 16)
         out.draw(picture(clean, grid, f"Figure 12 {name}: {case.words}. Hamming window.", -25.0))
-        out.plot(
-            [(f"case {name}", bins, density), ("Rayleigh", bins, rayleigh(bins))],
-            "amplitude over its root mean square",
-            "density",
-            f"Grey levels of the lower left patch in case {name} (histogram of figure 12 {name}), "
-            f"{len(amplitude)} pixels, without a window.",
-            dots=[f"case {name}"],
-        )
-    out.say(
-        "Patches differ in permittivity (1 to 40) and conductivity (1e-4 to 1 S/m); the paper gives the ranges alone. "
-        "The patch of permittivity 1 reflects nothing and is black. Facets per resolution cell: 4 x 4, in case c 16 "
-        "along azimuth and 4 along range. The heights of a rough profile have a standard deviation of one wavelength."
-    )
+        curves = [(f"case {name}", bins, density), ("Rayleigh", bins, rayleigh(bins))]
+        out.plot("Grey levels of the lower left patch", curves, dots=[f"case {name}"])
+    out.say()
     _brightness(out, mean, reflected)
     out.keep(mean=mean, reflected=reflected)
     return out
@@ -128,16 +112,10 @@ def _brightness(out: Section, mean: dict[str, np.ndarray], reflected: np.ndarray
     """Whether patches are as bright as their reflectivity says, and how bright a mirror is."""
     bright = reflected > 1e-3
     ratio = 10 * np.log10(mean["b"][bright] / reflected[bright])
-    out.states(
-        "case b: brightness of the patches and Fresnel's |R|^2", "figure 12, equation A.7", "follows the material",
-        f"rms {np.std(ratio):.2f} dB about a constant, over {np.ptp(10 * np.log10(reflected[bright])):.0f} dB",
-        np.std(ratio) < 1.0, value=float(np.std(ratio)), rule="rms below 1 dB", basis="theory",
-    )  # fmt: skip
+    rms, span = float(np.std(ratio)), np.ptp(10 * np.log10(reflected[bright]))
+    out.states("case b: brightness of the patches and Fresnel's |R|^2", rms, rms < 1.0, rms=rms, span=span)
     level = float(10 * np.log10(np.median(mean["d"][bright] / mean["b"][bright])))
-    item = "case d: power of the patches without statistics"
-    measured = f"{-level:.0f} dB below case b: flat patches reflect away from the radar, and only their edges are seen"
-    rule = "more than 40 dB below case b"
-    out.states(item, "figure 12 d", "no random grey levels", measured, level < -40, value=level, rule=rule)
+    out.states("case d: power of the patches without statistics", level, level < -40, below=-level)
 
 
 def patches(field: tuple[int, int]) -> tuple[np.ndarray, list[tuple[float, float]]]:

@@ -41,7 +41,7 @@ PIXELS = {True: 64, False: 512}
 
 def figure_9(lab: Lab) -> Section:
     """Figures 9 and 10: the raw signal before range compression, by both generators, and its image."""
-    out = Section("raw", "The raw signal of a cone, and its image (figures 9 and 10)")
+    out = Section.of("saras", "raw")
     half = SIDE / 2
     scene, track = _cone(), _track(SIDE)
     window = half * np.sin(LOOK) + SPEED_OF_LIGHT * CHIRP.duration / 4 + 20
@@ -52,26 +52,15 @@ def figure_9(lab: Lab) -> Section:
     raw, direct = (make(scene, CHIRP, track, tolerance=1e-2, **options) for make in (spectral_echo, echo))
     paper = spectral_echo(scene, CHIRP, track, variant="saras", tolerance=PAPER_TOLERANCE, **options)
     apart, of_paper = (_apart(made, direct) for made in (raw, paper))
-    item = "raw signal by Fourier transforms and by the sum over facets and pulses"
-    measured = f"differ by {apart:.1e}"
-    rule = "below 2e-2, the tolerances of both together"
-    out.states(item, "section IV", "the same signal", measured, apart < 2e-2, value=apart, rule=rule, basis="theory")
+    out.states("raw signal by Fourier transforms and by the sum over facets and pulses", apart, apart < 2e-2)
     footprint = WIDTH * np.hypot(HEIGHT, DISTANCE)
     order = SPEED_OF_LIGHT / CHIRP.center * np.hypot(HEIGHT, DISTANCE) / (2 * np.pi * footprint**2)
-    item = "error of the paper's transfer function, by stationary phase"
-    source = "equations 26 to 36, footnote 2"
-    expected = f"of the order of lambda R0/(2 pi X^2), {order:.1e} here"
-    why = "by sarcl.spectral_echo(variant='saras'), against the sum over facets and pulses"
-    rule = "within a factor of 5"
-    out.states(item, source, expected, f"{of_paper:.1e}", order / 5 < of_paper < 5 * order, why, of_paper, rule=rule)
+    holds = order / 5 < of_paper < 5 * order
+    out.states("error of the paper's transfer function, by stationary phase", of_paper, holds, order=order)
     _show_raw(out, raw, window)
     _show_image(out, lab, raw, track)
-    out.say(
-        f"The paper gives neither geometry nor sizes. Here the antenna is {HEIGHT / 1e3:g} km high and looks "
-        f"{np.degrees(LOOK):.0f} deg off the vertical; the field is {SIDE:g} m wide, the cone {2 * CONE[0]:g} m wide "
-        f"and {CONE[1]:.1f} m high. Facets of {CELL:g} m, four per pixel of {STEP:g} m, have random amplitudes and "
-        "phases, and their corners random heights of 0.1 wavelengths, as in the paper."
-    )
+    look = np.degrees(LOOK)
+    out.say(height_km=HEIGHT / 1e3, look_deg=look, side=SIDE, cone=CONE, cone_width=2 * CONE[0], cell=CELL, step=STEP)
     return out
 
 
@@ -99,12 +88,9 @@ def _show_raw(out: Section, raw: PhaseHistory, window: float) -> None:
     rows = np.abs(azimuth) < SIDE / 2 + WIDTH * np.hypot(HEIGHT, DISTANCE) / 2
     real = signal.real[np.ix_(rows, columns)] / np.abs(signal).max()
     top = float(np.percentile(np.abs(real), 99))
-    out.picture(
-        np.clip(real, -top, top), _edges(ranges[columns]), _edges(azimuth[rows]),
-        "slant range from the middle, m", "azimuth of the antenna, m",
-        "Real part of the raw signal, before range compression (figure 9).", floor_db=-2 * top,
-        unit="of the largest modulus", equal=True,
-    )  # fmt: skip
+    ends, unit = (_edges(ranges[columns]), _edges(azimuth[rows])), "of the largest modulus"
+    values = np.clip(real, -top, top)
+    out.picture("Real part of the raw signal", values, *ends, floor_db=-2 * top, unit=unit, equal=True)
 
 
 def _show_image(out: Section, lab: Lab, raw: PhaseHistory, track: Trajectory) -> None:
@@ -121,15 +107,12 @@ def _show_image(out: Section, lab: Lab, raw: PhaseHistory, track: Trajectory) ->
     ranges, azimuth = image.grid.ranges - middle, (image.grid.times - closest.mean()) * track.velocities[0, 1]
     profile = power[np.abs(azimuth) < 2].mean(axis=0)
     front = -CONE[0] * float(np.sin(LOOK))  # the whole line from foot to tip lies at one range
-    cell = SPEED_OF_LIGHT / 2 / CHIRP.bandwidth
+    cell, brightest = SPEED_OF_LIGHT / 2 / CHIRP.bandwidth, float(ranges[profile.argmax()])
     item = "brightest slant range of the cone in the range-Doppler image"
-    out.number(item, "figure 10", front, float(ranges[profile.argmax()]), 1.5 * cell, "m", ".1f", basis="geometry")
-    out.picture(
-        10 * np.log10(np.maximum(power / np.median(power), 1e-9)), _edges(ranges), _edges(azimuth),
-        "slant range from the middle, m", "azimuth, m",
-        "Range-Doppler image of this raw signal, relative to the median (figure 10).", floor_db=-30.0,
-        percentile=99.5, equal=True,
-    )  # fmt: skip
+    out.number(item, brightest, expected=front, within=1.5 * cell)
+    db = 10 * np.log10(np.maximum(power / np.median(power), 1e-9))
+    look: dict[str, Any] = {"floor_db": -30.0, "percentile": 99.5, "equal": True}
+    out.picture("Range-Doppler image of this raw signal", db, _edges(ranges), _edges(azimuth), **look)
 
 
 def _edges(middles: np.ndarray) -> tuple[float, float]:
@@ -141,58 +124,30 @@ def _edges(middles: np.ndarray) -> tuple[float, float]:
 def times(lab: Lab) -> Section:
     """Section V: seconds and error of both generators."""
     n = PIXELS[lab.quick]
-    out = Section("times", f"Run times of {n} x {n} pixels (section V)")
+    out = Section.of("saras", "times", n=n)
     rows, worst = [], 0.0
     for cells in (1, 2, 3, 4):
         side = n * STEP / 2
         scene = ground((-side, side), (DISTANCE - side, DISTANCE + side), (cells * n, cells * n), material=ROUGH)
-        options: dict[str, Any] = {
-            "antenna": ANTENNA,
-            "tolerance": RAW_TOLERANCE,
-            "max_edge": None,
-            "device": lab.device,
-        }
+        options: dict[str, Any] = {"antenna": ANTENNA, "max_edge": None, "device": lab.device}
         results = []
         for generator in (spectral_echo, echo):
             start = time.perf_counter()
             with warnings.catch_warnings():  # one facet per pixel is too few for speckle, and the paper's choice
                 warnings.simplefilter("ignore", SarclWarning)
-                raw = generator(scene, CHIRP, _track(2 * side), check=True, **options)
+                raw = generator(scene, CHIRP, _track(2 * side), tolerance=RAW_TOLERANCE, check=True, **options)
             report = raw.report
             assert report is not None and report.measured_error is not None
             seconds = time.perf_counter() - start - report.seconds.get("check", 0.0)
             results += [seconds, report.measured_error]
         square = cells * cells
-        rows.append(
-            [
-                str(square),
-                str(VAX[square]),
-                f"{results[0]:.1f}",
-                f"{results[1]:.1e}",
-                f"{results[2]:.1f}",
-                f"{results[3]:.1e}",
-            ]
-        )
+        measured = [f"{value:{form}}" for value, form in zip(results, (".1f", ".1e", ".1f", ".1e"), strict=True)]
+        rows.append([str(square), str(VAX[square]), *measured])
         out.keep(**{f"{square} facets per pixel: seconds and errors": results})
         worst = max(worst, results[1], results[3])
-    caption = (
-        "Seconds on the device of this run, scene included, and the measured error against the exact sum (random "
-        "samples of the raw signal, recomputed in double precision facet by facet)."
-    )
-    out.table(
-        ["facets per pixel", "VAX, 512 x 512, s", "Fourier transforms, s", "error", "sum, s", "error"], rows, caption
-    )
-    item = "largest error of the timed raw signals"
-    expected = f"below the tolerance, {RAW_TOLERANCE:g}"
-    rule = f"at most {RAW_TOLERANCE:g}"
-    out.states(
-        item, "section V", expected, f"{worst:.1e}", worst <= RAW_TOLERANCE, value=worst, rule=rule, basis="theory"
-    )
-    out.say(
-        "A pixel is 0.8 m on the ground; a facet of the paper is a square, of which sarcl makes two triangles. The sum "
-        "over facets and pulses grows with their product; the time of the Fourier transforms grows with the number of "
-        "facets and, N^2 log N, with the size of the map."
-    )
+    out.table("Seconds on the device of this run", rows)
+    out.states("largest error of the timed raw signals", worst, worst <= RAW_TOLERANCE, raw_tolerance=RAW_TOLERANCE)
+    out.say()
     return out
 
 

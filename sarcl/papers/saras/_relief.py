@@ -25,7 +25,7 @@ POLARIZATIONS = ("HH", "VV", "HV")
 
 def parallelepiped(lab: Lab) -> Section:
     """Figure 13."""
-    out = Section("parallelepiped", "Layover and shadow of a parallelepiped (figure 13)")
+    out = Section.of("saras", "parallelepiped")
     depth, width, height = BOX[0] / 2, BOX[1] / 2, BOX[2]
     scene = ground((-40, 40), (-45, 45), material=ROUGH) + shapes.box(BOX, material=ROUGH)
     raw = FINE.echo(scene, tolerance=1e-3, seed=1, device=lab.device)
@@ -39,9 +39,7 @@ def parallelepiped(lab: Lab) -> Section:
     dark = (y < width - inside[0]) & (x > ends[0] + inside[1]) & (x < ends[1] - inside[1])
     lit = power[(x > ends[1] + inside[1]) & (x < 42)].mean()
     level = float(10 * np.log10(power[dark].mean() / lit))
-    measured = f"{level:.0f} dB of the ground beside it"
-    why = "side lobes of the ground around it: the image has a Taylor window of -90 dB"
-    out.states("power in the shadow", FIGURE, "free of speckle", measured, level < -60, why, level, rule="below -60 dB")
+    out.states("power in the shadow", level, level < -60)
     _edges(out, lab, raw, ends, (depth, width, height))
     return out
 
@@ -61,40 +59,25 @@ def _edges(
         places = (np.arange(240) - 120) * FINE.null[1] * scale / 4
         lit = profile[places > ends[1] * scale + 4].mean()
         first, last = crossings(profile, places, lit / 2)
-        within = 0.5 * FINE.null[1] * scale
+        cell = FINE.null[1] * scale
+        out.words = {"plane": plane}
         for name, wanted, found in (("begins", ends[0], first), ("ends", ends[1], last)):
-            out.number(
-                f"shadow {name}, {plane} range", FIGURE, wanted * scale, found, within, "m", ".2f", basis="geometry"
-            )
-        out.number(
-            f"length of the dark run, {plane} range", FIGURE, (ends[1] - ends[0]) * scale, last - first,
-            0.7 * FINE.null[1] * scale, "m", ".2f", basis="geometry",
-        )  # fmt: skip
+            out.number("shadow {name}, {plane} range", found, expected=wanted * scale, within=0.5 * cell, name=name)
+        run = (ends[1] - ends[0]) * scale
+        out.number("length of the dark run, {plane} range", last - first, expected=run, within=0.7 * cell)
         if plane == "ground":
             over = profile[(places > front + 2) & (places < -depth - 2)].mean()
             before = profile[(places > front - 15) & (places < front - 2)].mean()
             near = places < front + 3
             start = crossings(profile[near], places[near], (before + over) / 2)[1]
-            out.number("layover begins", FIGURE, front, start, FINE.null[1], "m", ".2f", basis="geometry")
-            out.plot(
-                [("mean over azimuth", places, 10 * np.log10(profile / lit))],
-                "ground range, m",
-                "dB over the ground",
-                "Profile across the parallelepiped, mean over azimuth: layover, then shadow, which the side lobes of a "
-                "Hamming window fill to about -33 dB.",
-            )
-    out.say(
-        f"The paper gives no dimensions. The solid is {2 * depth:g} m deep, {2 * width:g} m wide and {height:g} m high "
-        f"here, seen {np.degrees(FINE.look):.0f} deg off the vertical, and the values marked geometry follow from "
-        "that: an edge of height h is imaged h cot(look) nearer to the radar on the ground and hides h tan(look) "
-        "behind it. On the ground the dark run is h (tan(look) + cot(look)) long; in slant range it is h / cos(look), "
-        "whatever the depth of the solid, as long as its top is imaged beyond the foot of its front."
-    )
+            out.number("layover begins", start, expected=front, within=FINE.null[1])
+            out.plot("Profile across the parallelepiped", [("mean over azimuth", places, 10 * np.log10(profile / lit))])
+    out.say(depth=2 * depth, width=2 * width, height=height, look_deg=np.degrees(FINE.look))
 
 
 def cone(lab: Lab) -> Section:
     """Figures 14 to 16."""
-    out = Section("cone", "A cone in three polarisations (figures 14 to 16)")
+    out = Section.of("saras", "cone")
     flat = ground((-34, 34), (-55, 50), material=ROUGH)
     scene = flat + shapes.cone(12, 12 * TANGENT, sections=120, material=ROUGH)
     grid, n = RADAR.grid((80, 90), pixels=2), LOOKS[lab.quick]
@@ -105,42 +88,31 @@ def cone(lab: Lab) -> Section:
     y = np.abs(grid.positions[:, 0, 1])
     middle, side = y < 0.5, (y > 5) & (y < 9)
     bright = [float(p[middle].mean(axis=0).max() / p[side].mean(axis=0).max()) for p in mean]
-    for i, name in enumerate(POLARIZATIONS):
-        most = i < 2
-        out.states(
-            f"{name} where the cone faces the radar", f"figure {14 + i}", "maximum return" if most else "no return",
-            f"{bright[i]:.2g} times the return beside it", bright[i] > 2 if most else bright[i] < 0.3, value=bright[i],
-            rule="above 2" if most else "below 0.3",
-        )  # fmt: skip
+    for name, number, ratio in zip(POLARIZATIONS, (14, 15, 16), bright, strict=True):
+        out.words = {"name": name, "number": number}
+        if name == "HV":
+            out.states("{name} where it faces the radar", ratio, ratio < 0.3)
+        else:
+            out.states("{name} where the cone faces the radar", ratio, ratio > 2)
     x = grid.positions[0, :, 0]
     peak = mean[:2, middle].mean(axis=1).max(axis=1)
     apart = float(10 * np.log10(peak[1] / peak[0]))
-    item = "VV over HH where the cone faces the radar"
-    expected = "no marked differences"
-    out.states(item, "figures 14 and 15", expected, f"{apart:.1f} dB", abs(apart) < 1, value=apart, rule="within 1 dB")
+    out.states("VV over HH where the cone faces the radar", apart, abs(apart) < 1)
     beside = mean[:2][:, y < 20][:, :, x > 40].mean(axis=(1, 2))
     flat_apart = float(10 * np.log10(beside[1] / beside[0]))
     cosine = np.array(np.cos(RADAR.look))
     h, v = fresnel(cosine, np.array(ROUGH.permittivity(RADAR.center)))
-    item = "VV over HH on flat ground"
-    source = "equations A.7, A.13, A.15"
-    out.number(item, source, float(20 * np.log10(abs(v / h))), flat_apart, 1.0, "dB", ".1f", basis="theory")
-    out.say(
-        "HH and VV agree where the cone faces the radar. The flat ground is much darker in VV, as Fresnel's "
-        "coefficients say; the printed figures do not show it, because each has a grey scale of its own."
-    )
+    out.number("VV over HH on flat ground", flat_apart, expected=float(20 * np.log10(abs(v / h))))
+    out.say()
     samples = RADAR.echo(flat, polarization=POLARIZATIONS, device=lab.device).samples
     hh, hv = (float(np.linalg.norm(np.asarray(samples)[i::3])) for i in (0, 2))
-    measured = f"{hv / hh:.1g} of HH's amplitude"
-    out.states(
-        "HV of flat ground", "figure 16", "no return", measured, hv < 1e-5 * hh, value=hv / hh, rule="below 1e-5 of HH"
-    )
+    out.states("HV of flat ground", hv / hh, hv < 1e-5 * hh)
     return out
 
 
 def composite(lab: Lab) -> Section:
     """Figure 17."""
-    out = Section("composite", "A parallelepiped on a cylinder, and a cone beside it (figure 17)")
+    out = Section.of("saras", "composite")
     plain = ground((-34, 34), (-55, 50), material=ROUGH)
     tower = shapes.cylinder(12, 8, sections=120, material=ROUGH).on(plain, -12, -12)
     top = shapes.box((10, 12, 12), material=ROUGH).on(tower, -12, -12)
@@ -156,9 +128,7 @@ def composite(lab: Lab) -> Section:
     end = -7 + 20 * TANGENT  # the shadow of the rear edge of the parallelepiped, 20 m high
     lit = profile[(x > end + 4) & (x < 44)].mean()
     found = crossings(profile, x, lit / 2)[1]
-    out.number(
-        "end of the parallelepiped's shadow", "figure 17", end, found, RADAR.null[1], "m", ".2f", basis="geometry"
-    )
+    out.number("end of the parallelepiped's shadow", found, expected=end, within=RADAR.null[1])
     return out
 
 

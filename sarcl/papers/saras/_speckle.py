@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import brentq
 
+from ...figures import html
 from ...model.image_grid import ImageGrid
 from ...model.phase_history import PhaseHistory
 from ...scene.scene import Scene
@@ -31,7 +32,7 @@ FINE = 8  # pixels per cell of figure 7
 
 def section(lab: Lab) -> Section:
     """Figures 5 to 7 and table I."""
-    out = Section("speckle", "Speckle of homogeneous ground (figures 5 to 7, table I)")
+    out = Section.of("saras", "speckle")
     n = CELLS[lab.quick]
     radar = replace(FLAT, n_pulses=round(1.1 * n[0]))
     y, x = ((-k * null / 2, k * null / 2) for k, null in zip(n, radar.null, strict=True))
@@ -44,10 +45,8 @@ def section(lab: Lab) -> Section:
     amplitude = np.abs(pixels.ravel()) / np.sqrt((np.abs(pixels) ** 2).mean())
     levels, density = histogram(amplitude, 3.0)
     out.draw(picture(np.abs(image) ** 2, shown, "Flat homogeneous ground (figure 5)."))
-    x_name = "amplitude over its root mean square"
-    caption = "Grey levels of the image (figure 6)."
     out.plot(
-        [("image", levels, density), ("Rayleigh", levels, rayleigh(levels))], x_name, "density", caption, dots=["image"]
+        "Grey levels of the image", [("image", levels, density), ("Rayleigh", levels, rayleigh(levels))], dots=["image"]
     )
     _correlations(out, lab, radar, raw, n)
     return out
@@ -56,25 +55,15 @@ def section(lab: Lab) -> Section:
 def _distributions(out: Section, pixels: np.ndarray) -> None:
     """Figure 6: amplitude, phase and intensity of independent pixels."""
     noise = speckle(pixels)
-    for item, source, law, p in (
-        ("amplitudes of the image", "figure 6", "Rayleigh", noise.rayleigh),
-        ("phases of the image", "section III", "uniform", noise.uniform),
-    ):
-        out.states(item, source, law, tested(p), p > SIGNIFICANT, value=p, rule=f"{TEST}: p above {SIGNIFICANT:g}")
+    out.words = {"test": TEST, "significant": SIGNIFICANT}
+    for item, p in (("amplitudes of the image", noise.rayleigh), ("phases of the image", noise.uniform)):
+        out.states(item, p, p > SIGNIFICANT, measured=tested(p))
     error = 1 / np.sqrt(pixels.size)  # of the contrast of so many exponential intensities
-    out.number(
-        "standard deviation of the intensity over its mean", "figure 6: of Rayleigh amplitudes", 1.0, noise.contrast,
-        4 * error, why="" if abs(noise.contrast - 1) <= 4 * error else "more than four standard errors off",
-        basis="theory",
-    )  # fmt: skip
+    why = {"why": ""} if abs(noise.contrast - 1) <= 4 * error else {}
+    out.number("standard deviation of the intensity over its mean", noise.contrast, within=4 * error, **why)
     of_intensity = speckle(np.abs(pixels) ** 2 + 0j).rayleigh
-    out.states(
-        "intensities of the image", "caption of figure 6", 'Rayleigh ("I is the Intensity")', tested(of_intensity),
-        of_intensity > SIGNIFICANT,
-        "the amplitude of one look has Rayleigh's distribution, its intensity is exponential; the figure itself, which "
-        "was not at hand, may show the square root of I", of_intensity,
-        rule=f"{TEST}: p above {SIGNIFICANT:g}", cause="interpretation",
-    )  # fmt: skip
+    holds = of_intensity > SIGNIFICANT
+    out.states("intensities of the image", of_intensity, holds, measured=tested(of_intensity))
 
 
 def _correlations(out: Section, lab: Lab, radar: FarRadar, raw: PhaseHistory, n: tuple[int, int]) -> None:
@@ -84,27 +73,18 @@ def _correlations(out: Section, lab: Lab, radar: FarRadar, raw: PhaseHistory, n:
     shape = [int((k - 8) / s) for k, s in zip(n, size, strict=True)]
     pixels = radar.focus(raw, radar.grid(shape, (1 / size[0], 1 / size[1])), device=lab.device)
     table = np.array([[_correlation(pixels, azimuth, along) for azimuth in range(5)] for along in range(5)])
-    within = 0.05
     for name, printed, found in (("azimuth", TABLE[0], table[0]), ("range", [row[0] for row in TABLE], table[:, 0])):
         for lag in range(1, 5):
-            out.number(f"autocorrelation, lag {lag} in {name}", "table I", printed[lag], float(found[lag]), within,
-                       form=".2f", why="the size of a pixel was chosen by this lag" if lag == 1 else "")  # fmt: skip
+            why = {} if lag == 1 else {"why": ""}
+            out.words = {"lag": lag, "name": name}
+            out.number("autocorrelation, lag {lag} in {name}", float(found[lag]), expected=printed[lag], **why)
     apart = float(np.abs(table - TABLE).max())
-    item = "autocorrelation at all 25 lags"
-    measured = f"differs by up to {apart:.2f}"
-    out.states(
-        item, "table I", "the 25 values of the table", measured, apart < 0.06, value=apart, rule="difference below 0.06"
-    )
-    out.say(
-        "The paper does not give the size of a pixel. It follows from the two lags of one pixel: the response of a "
-        f"flat spectrum is sinc(distance/null), and 0.51 and 0.70 are those at {size[0]:.2f} nulls in azimuth and "
-        f"{size[1]:.2f} in range. The other 22 lags are then a comparison; they differ from image to image by about "
-        f"{1 / np.sqrt(np.prod(shape) * np.prod(size)):.3f} with {shape[0]} x {shape[1]} pixels."
-    )
+    out.states("autocorrelation at all 25 lags", apart, apart < 0.06)
+    error = 1 / np.sqrt(np.prod(shape) * np.prod(size))
+    out.say(size=size, error=error, shape=shape)
     rows = [[str(i), *(f"{a:.2f} / {b:.2f}" for a, b in zip(TABLE[i], table[i], strict=True))] for i in range(5)]
-    out.table(
-        ["range lag", *(f"azimuth lag {i}" for i in range(5))], rows, "Table I: printed / measured autocorrelation."
-    )
+    head = ["range lag", *(f"azimuth lag {i}" for i in range(5))]
+    out.draw(html.table(head, rows, "Table I: printed / measured autocorrelation."))
     grid = radar.grid((n[0] - 8, FINE * (n[1] - 8)), (1, FINE))
     fine = radar.focus(raw, grid, device=lab.device)
     lags = np.arange(4 * FINE + 1)
@@ -113,15 +93,9 @@ def _correlations(out: Section, lab: Lab, radar: FarRadar, raw: PhaseHistory, n:
     places = np.column_stack([lags / FINE * radar.null[1], np.zeros((len(lags), 2))])
     response = np.abs(radar.focus(point, ImageGrid.points(places), device=lab.device))
     off = float(np.abs(curve - response).max())
-    item = "autocorrelation along range and the response of a point"
-    rule = "at most 0.05 of the peak over the whole curve"
-    out.states(item, "figure 7", "coincident", f"differ by up to {off:.3f}", off < 0.05, value=off, rule=rule)
-    out.plot(
-        [("autocorrelation of the image", lags / FINE, curve), ("response of a point", lags / FINE, response)],
-        "distance in range, nulls",
-        "modulus",
-        "Range section of the image's autocorrelation (figure 7).",
-    )
+    out.states("autocorrelation along range and the response of a point", off, off < 0.05)
+    curves = [("autocorrelation of the image", lags / FINE, curve), ("response of a point", lags / FINE, response)]
+    out.plot("Range section of the image's autocorrelation", curves)
     out.keep(table=table, pixel_in_nulls=size, curve=curve, response=response)
 
 

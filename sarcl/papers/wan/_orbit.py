@@ -29,12 +29,13 @@ SLANT, PRF = 1.05e6, 1700.0  # m: 45 deg of incidence; Hz
 SCALE = 8.0  # of the solids; the paper gives no sizes
 FOOT, CUBOID, TOP = (18.0, 12.0, 4.0), (14.0, 14.0, 6.0), (5.0, 6.0)  # radii and height; sides; radius and height
 SIDES = (34.0, 50.0)  # half the ground along azimuth and range
+LOOK: dict[str, Any] = {"floor_db": -30.0, "percentile": 99.5, "equal": True}  # of pictures
 PULSES, LOOKS, CELL = {True: 900, False: 1400}, {True: 2, False: 8}, 2.5  # m, cells of the ground
 
 
 def section(lab: Lab) -> Section:
     """Figures 6 to 8."""
-    out = Section("orbit", "Solids on rough ground, from an orbit to the image (figures 6 to 8)")
+    out = Section.of("wan", "orbit")
     orbit = Orbit.kepler(7.17e6, 1e-3, 1.72, span=(-60.0, 60.0))  # m, rad: 800 km high
     origin = orbit.geolocate(0.0, SLANT, side="right")
     axes = _axes(orbit, origin)
@@ -60,34 +61,27 @@ def section(lab: Lab) -> Section:
             first, drawn = range_doppler(raw, side="right", check=True, **options), scene
     assert first is not None and first.report is not None and first.report.measured_error is not None
     apart = float(first.report.measured_error)
-    item = "range-Doppler image and backprojection of the same echoes"
-    measured = f"differ by {apart:.1e}"
-    rule = "below the tolerance of 1e-2"
-    out.states(item, "figure 8", "the same image", measured, apart < 1e-2, value=apart, rule=rule, basis="theory")
+    out.states("range-Doppler image and backprojection of the same echoes", apart, apart < 1e-2)
     local = (np.asarray(first.grid.positions) - origin) @ axes.T
     _shadow(out, power, grid, float(np.tan(seen.incidence)))
     rate = float(seen.doppler_rate(CHIRP.center))
     out.keep(incidence_deg=float(np.degrees(seen.incidence)), doppler_rate_hz_per_s=rate, range_doppler_error=apart)
-    out.say(
-        f"Kepler orbit about the rotating Earth, 800 km high, {np.degrees(seen.incidence):.0f} deg of incidence, "
-        f"Doppler rate {rate:.0f} Hz/s. Echoes arrive where the satellite is then. The paper gives no sizes; the "
-        f"largest solid is {2 * SCALE * FOOT[0]:.0f} m wide here, because the resolution is 4 m in slant range."
-    )
+    out.say(incidence_deg=np.degrees(seen.incidence), rate=rate, width=2 * SCALE * FOOT[0])
     half = SCALE * SIDES[0], SCALE * SIDES[1]
     out.picture(
-        _db(power), (-half[1], half[1]), (-half[0], half[0]), "ground range, m", "azimuth, m",
-        f"Backprojected on the ground: mean of {LOOKS[lab.quick]} looks (figure 6).", floor_db=-30.0,
-        percentile=99.5, equal=True,
-    )  # fmt: skip
+        "Backprojected on the ground",
+        _db(power),
+        (-half[1], half[1]),
+        (-half[0], half[0]),
+        **LOOK,
+        words={"looks": LOOKS[lab.quick]},
+    )
     rows = np.abs(local[:, local.shape[1] // 2, 1]) < half[0]
     columns = np.abs(local[local.shape[0] // 2, :, 0]) < half[1]
     image = np.abs(np.asarray(first.data)[rows][:, columns]) ** 2
     along, across = local[rows, local.shape[1] // 2, 1], local[local.shape[0] // 2, columns, 0]
     _maps_of_cells(out, lab, orbit, axes, origin, drawn, image, (along, across))
-    out.picture(
-        _db(image), (across[0], across[-1]), (along[0], along[-1]), "ground range of the slant range, m", "azimuth, m",
-        "Range-Doppler image, one look (figure 8).", floor_db=-30.0, percentile=99.5, equal=True,
-    )  # fmt: skip
+    out.picture("Range-Doppler image", _db(image), (across[0], across[-1]), (along[0], along[-1]), **LOOK)
     return out
 
 
@@ -110,22 +104,17 @@ def _maps_of_cells(
     along, across = ((middles - origin) @ axes[i] for i in (1, 0))
     ground_map = summed(power, along, across, (_edges(ground_places[0]), _edges(ground_places[1])))
     ends = [(float(places[0]), float(places[-1])) for places in ground_places]
-    for cells, plane, name in (
-        (ground_map, "on the ground", "ground range, m"),
-        (slant_map, "in the slant plane: foreshortening and layover", "ground range of the slant range, m"),
-    ):
-        caption = f"Power of the facets in cells {plane} (figure 7)."
-        out.picture(
-            _db(cells), ends[1], ends[0], name, "azimuth, m", caption, floor_db=-30.0, percentile=99.5, equal=True
-        )
+    for key, cells in (("on the ground", ground_map), ("in the slant plane", slant_map)):
+        out.picture(f"Power of the facets in cells {key}", _db(cells), ends[1], ends[0], **LOOK)
     alike, unlike = (correlation(image, cells, AVERAGED) for cells in (slant_map, ground_map))
     out.states(
-        "range-Doppler image and the map of the slant plane", "figures 7 and 8", "very close",
-        f"correlation {alike:.2f} of the amplitudes of {AVERAGED} x {AVERAGED} pixels; with the ground's map "
-        f"{unlike:.2f}", alike > max(ALIKE, unlike), value=[alike, unlike],
-        rule=f"correlation above {ALIKE:g} and above that with the ground's map; speckle is averaged over "
-        f"{AVERAGED**2} pixels",
-    )  # fmt: skip
+        "range-Doppler image and the map of the slant plane",
+        [alike, unlike],
+        alike > max(ALIKE, unlike),
+        averaged=AVERAGED,
+        alike=ALIKE,
+        n_averaged=AVERAGED**2,
+    )
 
 
 def _edges(places: np.ndarray) -> np.ndarray:
@@ -171,9 +160,8 @@ def _shadow(out: Section, power: np.ndarray, grid: ImageGrid, tangent: float) ->
     below = profile < lit / 2
     inside = np.flatnonzero(below & (x < end + 30))
     measured_end = float(x[inside[-1]] + grid.spacing[1] / 2)
-    out.number("end of the cylinder's shadow", "figures 7 and 8", end, measured_end, 12.0, "m", ".0f", basis="geometry")
-    caption = "Profile through the solids: layover in front, shadow behind."
-    out.plot([("mean over azimuth", x, 10 * np.log10(profile / lit))], "ground range, m", "dB over the ground", caption)
+    out.number("end of the cylinder's shadow", measured_end, expected=end)
+    out.plot("Profile through the solids", [("mean over azimuth", x, 10 * np.log10(profile / lit))])
 
 
 def _db(power: np.ndarray) -> np.ndarray:

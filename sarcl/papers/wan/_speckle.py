@@ -19,7 +19,7 @@ FINITE = 0.01  # difference of distribution functions that a finite number of fa
 
 def section(lab: Lab) -> Section:
     """Figure 3."""
-    out = Section("speckle", "Amplitudes and phases of rough ground (figure 3)")
+    out = Section.of("wan", "speckle")
     n = CELLS[lab.quick]
     radar = l_band(round(1.3 * n))
     ends = [(-n * null / 2, n * null / 2) for null in radar.null]
@@ -38,26 +38,20 @@ def section(lab: Lab) -> Section:
         phases.append((f"{facets} facets per cell", levels - np.pi, density))
     many, few = statistics
     most = FINITE + CHANCE / np.sqrt(len(pixels))
-    measured = f"distribution differs by {many.difference:.3f}"
-    rule = f"largest difference of distribution functions below {most:.3f}: {FINITE:g}, and what chance allows"
-    out.states(
-        "amplitudes", "figure 3 a", "Rayleigh", measured, many.difference < most, value=many.difference, rule=rule
-    )
-    measured = f"p = {many.uniform:.2f} that they are"
-    rule = "p above 0.01 in the test of Kolmogorov and Smirnov"
-    out.states("phases", "figure 3 b", "uniform", measured, many.uniform > 0.01, value=many.uniform, rule=rule)
+    out.states("amplitudes", many.difference, many.difference < most, most=most, finite=FINITE)
+    out.states("phases", many.uniform, many.uniform > 0.01)
     out.keep(contrast=many.contrast, contrast_of_few=few.contrast, difference_of_few=few.difference)
     levels = curves[0][1]
-    caption = "Amplitudes of the image's resolution cells (figure 3 a)."
+    out.plot("Amplitudes of the image's resolution cells", [*curves, ("Rayleigh", levels, rayleigh(levels))])
     out.plot(
-        [*curves, ("Rayleigh", levels, rayleigh(levels))], "amplitude over its root mean square", "density", caption
+        "Phases of the image's resolution cells", [*phases, ("uniform", phases[0][1], np.full(16, 1 / (2 * np.pi)))]
     )
-    caption = "Phases of the image's resolution cells (figure 3 b)."
-    out.plot([*phases, ("uniform", phases[0][1], np.full(16, 1 / (2 * np.pi)))], "phase, rad", "density", caption)
     out.say(
-        f"Few of the smooth facets face the radar, so that many facets per cell are needed: with {curves[1][0]} the "
-        f"contrast is {few.contrast:.2f} instead of 1, with {curves[0][0]} {many.contrast:.2f}. The distribution of "
-        f"amplitudes differs from Rayleigh's by {few.difference:.3f} and {many.difference:.3f}. Phases are uniform "
-        "with both."
+        few_facets=curves[1][0],
+        few_contrast=few.contrast,
+        many_facets=curves[0][0],
+        many_contrast=many.contrast,
+        few_difference=few.difference,
+        many_difference=many.difference,
     )
     return out

@@ -19,33 +19,14 @@ from __future__ import annotations
 
 from functools import partial
 
-from .. import PAPERS
 from ..paper import Paper
 from . import _forming, _images, _setting, _sphere, _summary, _targets
 from ._lab import CELLS, REDUCTION, Lab
 
 __all__ = ["PAPER"]
 
-ABOUT = (
-    "The paper computes the echoes of an airborne L-band radar by solving Maxwell's equations around a target on a "
-    "grid (FDTD), once, and delays the surface currents that it finds for all other pulses (waveform forming). This "
-    "page computes its targets with sarcl.fullwave_echo, which takes several anchors where the tolerance needs them, "
-    "and with physical optics (sarcl.echo) on the same meshes. Source: " + PAPERS["zou"] + "."
-)
-TERMS = (
-    ("HH, VH", "Received and sent polarisation: VH is what is received vertically of what is sent horizontally."),
-    ("anchor", "A pulse whose currents are computed on the grid. The paper has one, in the middle of the track."),
-    ("waveform forming", "Currents of an anchor, delayed cell by cell, radiate the echoes of another pulse."),
-    ("run", "A solution of Maxwell's equations on the grid, for one anchor and one polarisation sent."),
-    ("physical optics", "Currents of every lit facet as on an infinite plane; no edges, no second reflection."),
-    ("dB re 1 m²", "Radar cross section of a point as bright as the pixel; of samples, of a point with such an echo."),
-    ("Mie's series", "The exact field that a conducting sphere scatters."),
-)
-
-PAPER = Paper(
-    name="zou",
-    title="Full-wave echoes with waveform forming: Zou et al. 2021, published and measured",
-    about=ABOUT,
+PAPER = Paper.of(
+    "zou",
     lab=Lab,
     sections=(
         _setting.section,
@@ -54,16 +35,8 @@ PAPER = Paper(
         _sphere.section,
         _forming.section,
     ),
-    quick=f"targets, range and track are 1/{REDUCTION[True]} of the paper's while the wavelength is the same, with "
-    f"{CELLS[True]} cells per shortest wavelength instead of {CELLS[False]}.",
-    terms=TERMS,
-    main=(
-        "range resolution of a point: distance of peak and null",
-        "azimuth resolution of a point: distance of peak and null",
-        "VH over HH, brightest pixels of the targets but the sphere",
-        "cuboid: one anchor against one run per azimuth",
-        "sharp cone: one anchor against one run per azimuth",
-        "sphere: echoes in HH against Mie's series",
-    ),
     long=True,
+    reduction=REDUCTION[True],
+    few_cells=CELLS[True],
+    cells=CELLS[False],
 )

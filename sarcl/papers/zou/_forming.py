@@ -32,34 +32,21 @@ class Comparison:
 
 def section(lab: Lab) -> Section:
     """Figure 8."""
-    out = Section("forming", "Waveform forming and one run of the grid per azimuth (figure 8)")
+    out = Section.of("zou", "forming", n_azimuths=N_AZIMUTHS, fine=FINE, tolerance=TOLERANCE)
     n, times = len(lab.radar.track), []
     for name in (BRICK, CONE):
         errors = compared(lab, name)
         report, plan = report_of(lab.full_wave(name))
         anchors, one, own = len(plan["anchors"]), *errors.totals
-        out.states(
-            f"{name}: one anchor against one run per azimuth", "figure 8" if name == BRICK else "section 4",
-            "the difference is not significant", f"differs by {one:.1%}, by up to {errors.one.max():.0%} at an azimuth",
-            one < FINE, "the beam of table 1 reaches 9.6 degrees to either side, where the currents are not those of "
-            "the middle", one, rule=f"rms over {N_AZIMUTHS} azimuths below {FINE:.0%}", cause="interpretation",
-        )  # fmt: skip
-        item = f"{name}: {anchors} anchors against one run per azimuth"
-        expected = f"at most {TOLERANCE:.0%}"
-        measured = f"differs by {own:.1%}, by up to {errors.own.max():.0%} at an azimuth"
-        why = f"predicted from the anchors alone: {report.predicted_error:.1%}"
-        rule = f"rms over {N_AZIMUTHS} azimuths off the anchors below {TOLERANCE:.0%}"
-        out.states(item, "tolerance", expected, measured, own < TOLERANCE, why, own, rule=rule, basis="theory")
+        out.words |= {"name": name, "anchors": anchors, "predicted": report.predicted_error}
+        source, worst = "figure 8" if name == BRICK else "section 4", errors.one.max()
+        out.states("{name}: one anchor against one run per azimuth", one, one < FINE, source=source, worst=worst)
+        item = "{name}: {anchors} anchors against one run per azimuth"
+        out.states(item, own, own < TOLERANCE, worst=errors.own.max())
         degrees = np.degrees(errors.angle)
-        out.plot(
-            [
-                ("one anchor, as in the paper", degrees, _db(errors.one)),
-                (f"{anchors} anchors", degrees, _db(errors.own)),
-            ],
-            "azimuth, degrees",
-            "error over the echo, dB",
-            f"Error of waveform forming at each azimuth, {name}, HH (figure 8).",
-        )
+        curves = [("one anchor, as in the paper", errors.one), (f"{anchors} anchors", errors.own)]
+        curves_db = [(label, degrees, _db(error)) for label, error in curves]
+        out.plot("Error of waveform forming at each azimuth", curves_db)
         own_seconds = sum(report.seconds.values())
         times.append([
             name, f"{errors.seconds[0] * n:.0f}", f"{errors.seconds[1]:.1f}", f"{own_seconds:.0f}",
@@ -70,13 +57,7 @@ def section(lab: Lab) -> Section:
             "seconds_per_azimuth": errors.seconds[0], "seconds_one_anchor": errors.seconds[1], "anchors": anchors,
             "seconds_own": own_seconds, "predicted": report.predicted_error,
         }})  # fmt: skip
-    caption = (
-        f"Time of all {n} pulses: one run of the grid per azimuth (estimated from {N_AZIMUTHS + 1} runs), one anchor, "
-        "and as many anchors as the tolerance needs, HH and VH."
-    )
-    out.table(
-        ["target", f"{n} runs, s", "one anchor, s", "several anchors, s", "runs over several anchors"], times, caption
-    )
+    out.table("Time of all {n} pulses", times, n=n, n_runs=N_AZIMUTHS + 1)
     return out
 
 

@@ -34,31 +34,25 @@ LEAST = 1e-7  # of the amplitude in HH that float32 resolves: VH is not below
 def section(name: str, lab: Lab) -> Section:
     """A target of figures 5 to 7."""
     target = _targets.find(name)
-    out = Section(name, f"Figures 5 to 7 ({target.letter}): {target.name}, {target.printed}")
+    out = Section.of("zou", "images", target=target)
+    out.key = name
     both = lab.full_wave(name)
     raws = {polarization: both.select(polarization=polarization) for polarization in BOTH}
     for polarization, raw in raws.items():
         field = received(raw, FIELD_RATE, 0.0)
-        caption = f"Envelope of the field at the receiver, {polarization} (figure 5 {target.letter})."
-        out.picture(
-            _db(np.abs(field.samples)), *_ends(field, raw), DELAY_NAME, SLOW_NAME, caption, floor_db=FLOOR, unit=LEVEL
-        )
+        out.words |= {"polarization": polarization}
+        levels_db = _db(np.abs(field.samples))
+        out.picture("Envelope of the field at the receiver", levels_db, *_ends(field, raw), floor_db=FLOOR, unit=LEVEL)
     records = {polarization: received(raw) for polarization, raw in raws.items()}
     for part, values in (("I", records["HH"].samples.real), ("Q", records["HH"].samples.imag)):
-        caption = f"{part} samples, HH, 600 MHz (figure 6 {target.letter})."
-        out.picture(
-            values, *_ends(records["HH"], raws["HH"]), DELAY_NAME, SLOW_NAME, caption,
-            floor_db=-2 * float(values.max()), unit="m",
-        )  # fmt: skip
+        out.words |= {"part": part}
+        out.picture("Samples", values, *_ends(records["HH"], raws["HH"]), floor_db=-2 * float(values.max()), unit="m")
     view = _View(lab, name)
     chains = {polarization: compress(recorded(records[polarization], raw)) for polarization, raw in raws.items()}
     sampled = {polarization: view.range_doppler(chain) for polarization, chain in chains.items()}
     for polarization, image in sampled.items():
-        out.draw(
-            view.picture(
-                _amplitudes(image), f"{polarization}, range-Doppler image of the samples (figure 7 {target.letter})."
-            )
-        )
+        caption = f"{polarization}, range-Doppler image of the samples (figure 7 {target.letter})."
+        out.draw(view.picture(_amplitudes(image), caption))
     images = {polarization: np.abs(view.backprojected(raw)) for polarization, raw in raws.items()}
     for polarization, pixels in images.items():
         out.draw(view.picture(pixels, f"{polarization}, backprojection of the echoes."))
@@ -86,10 +80,7 @@ def _draw_waves(out: Section, raw: PhaseHistory) -> None:
     (first, last), _ = _ends(field, raw)
     delay = np.linspace(first, last, field.samples.shape[1])
     rows = (("middle of the track", raw.n_rows // 2), ("beginning", 0))
-    caption = "Field of two pulses at the receiver, HH."
-    out.plot(
-        [(name, delay, field.samples[row].real) for name, row in rows], DELAY_NAME, "field times range, m", caption
-    )
+    out.plot("Field of two pulses at the receiver", [(name, delay, field.samples[row].real) for name, row in rows])
 
 
 def _say(out: Section, found: Levels, both: PhaseHistory) -> None:
@@ -97,14 +88,9 @@ def _say(out: Section, found: Levels, both: PhaseHistory) -> None:
     cross = 20 * np.log10(max(found.peak[1] / found.peak[0], LEAST))
     report, grid = report_of(both)
     model = report.model_error
-    out.say(
-        f"Brightest pixel in HH {20 * np.log10(found.peak[0]):.1f} dB re 1 m², by physical optics "
-        f"{20 * np.log10(found.optics):.1f}; the echoes of physical optics differ from those of full wave by "
-        f"{found.apart:.0%} of their root mean square. Brightest pixel in VH {cross:.0f} dB of that in HH. Physical "
-        f"optics of a perfect conductor sends back no VH. Grid of {grid['grid']} cells of {1e3 * grid['cell_m']:.3g} "
-        f"mm, {grid['cells']:.1f} per shortest wavelength; error of waveform forming {report.predicted_error:.1%}, of "
-        f"the grid {model or 0:.0%}, both predicted."
-    )
+    peak, optics = 20 * np.log10(found.peak[0]), 20 * np.log10(found.optics)
+    out.words |= {"peak_db": peak, "optics_db": optics, "found": found, "cross": cross, "model_error": model or 0}
+    out.say(grid=grid, cell_mm=1e3 * grid["cell_m"], predicted=report.predicted_error)
     out.keep(
         peak_hh_dbsm=20 * np.log10(found.peak[0]), cross_over_co_db=cross, rms_hh=found.rms[0], rms_vh=found.rms[1],
         peak_hh_optics_dbsm=20 * np.log10(found.optics), optics_differs=found.apart, model_error=model,
@@ -149,11 +135,7 @@ def _compare_chain(out: Section, view: _View, name: str, image: Image, raw: Phas
     exact = view.backprojected(raw, image.grid)
     chain = np.asarray(image.data) / image.gain
     apart = float(np.linalg.norm(chain - exact) / np.linalg.norm(exact))
-    item = f"{name}: range-Doppler image of 600 MHz samples"
-    expected = "the image of the echoes"
-    measured = f"differs by {apart:.1%} from backprojection of the echoes"
-    rule = f"below {CHAIN:.0%}"
-    out.states(item, "figures 6 and 7", expected, measured, apart < CHAIN, value=apart, rule=rule, basis="theory")
+    out.states("{name}: range-Doppler image of 600 MHz samples", apart, apart < CHAIN, name=name, chain=CHAIN)
 
 
 def _outline(lab: Lab, name: str) -> list[tuple[str, Any, Any]]:

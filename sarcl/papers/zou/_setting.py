@@ -33,29 +33,18 @@ POINT, SPACING = 3.0, 0.05  # m: half the range window and the image; pixels
 
 def section(lab: Lab) -> Section:
     """Tables 1 and 2."""
-    out = Section("setting", "Radar and targets (tables 1 and 2)")
+    out = Section.of("zou", "setting")
     radar = lab.radar
     upper = DOPPLER * (1 + BANDWIDTH / (2 * CHIRP.center))
     _point(out, lab)
     plane = max(_curved(radar.range_, lab.scene(target.name)) for target in _targets.TARGETS)
     phase = _curved(RANGE, _targets.find("tank").scene())
-    item = "phase error of plane waves at the ends of the tank, equation 4"
-    expected = "approximately a plane wave"
-    why = "equation 4 leaves out r'^2/2r of the distance of a cell; sarcl delays every cell by its own distance"
-    rule = "below 0.1 rad, two ways"
-    out.states(
-        item, "section 2.2", expected, f"{phase:.2f} rad", phase < 0.1, why, phase, rule=rule, cause="interpretation"
-    )
+    out.states("phase error of plane waves at the ends of the tank, equation 4", phase, phase < 0.1)
     out.keep(range_m=radar.range_, pulses=len(radar.track), half_beam_deg=np.degrees(HALF_BEAM), plane_wave_rad=plane)
     size = "" if radar.reduction == 1 else f" This run has targets, range and track of 1/{radar.reduction} of these."
-    out.say(
-        f"The paper prints no range. Here it is {RANGE:.0f} m, at which {PULSES} pulses, "
-        f"{RANGE * 2 * np.tan(HALF_BEAM):.0f} m of track, just cross the beam of {np.degrees(HALF_BEAM):.1f} degrees "
-        f"on either side that {DOPPLER:.0f} Hz of Doppler bandwidth need: {upper:.0f} Hz at the upper end of the band, "
-        f"below the PRF of {PRF:.0f} Hz.{size} Targets are in free space, with the centre of "
-        "their box at the origin, 45 degrees below the radar. Solids stand upright; cuboid and tank are longest along "
-        "the track. Distances are spherical: every cell has its own. Flat sides lie on nodes of the grid."
-    )
+    track, half_beam = RANGE * 2 * np.tan(HALF_BEAM), np.degrees(HALF_BEAM)
+    out.words = {"range": RANGE, "pulses": PULSES, "track": track, "doppler": DOPPLER, "prf": PRF}
+    out.say(half_beam_deg=half_beam, upper=upper, size=size)
     _table(out, lab)
     return out
 
@@ -69,16 +58,13 @@ def _point(out: Section, lab: Lab) -> None:
     image = backproject(raw, lab.radar.grid((POINT, POINT), SPACING), tolerance=1e-3, check=False, device=lab.device)
     response = measure(image, near=(0.0, 0.0, 0.0))
     assert isinstance(response, PointResponse)
-    for name, width, printed in zip(
-        ("range", "azimuth"), response.irw, (RANGE_RESOLUTION, AZIMUTH_RESOLUTION), strict=True
-    ):
-        item = f"{name} resolution of a point: distance of peak and null"
-        out.number(item, TABLE, printed, width / HALF_POWER, 0.02, "m", ".3f", f"{width:.3f} m wide at half power")
+    printed = RANGE_RESOLUTION, AZIMUTH_RESOLUTION
+    for name, width, expected in zip(("range", "azimuth"), response.irw, printed, strict=True):
+        out.words = {"name": name, "width": width}
+        item = "{name} resolution of a point: distance of peak and null"
+        out.number(item, width / HALF_POWER, expected=expected)
     off = float(np.linalg.norm(response.position))
-    item = "place of a point at the origin"
-    out.states(
-        item, "", "origin", f"{1000 * off:.2f} mm off", off < 0.01, value=off, rule="within 10 mm", basis="geometry"
-    )
+    out.states("place of a point at the origin", off, off < 0.01, off_mm=1000 * off)
 
 
 def _curved(range_: float, scene: Scene) -> float:
@@ -101,13 +87,5 @@ def _table(out: Section, lab: Lab) -> None:
             f"{plan['run_seconds'] / 60:.0f}", f"{needs.seconds / 3600:.1f}",
         ])  # fmt: skip
         out.keep(**{target.name: {"run_bytes": plan["run_bytes"], "runs": plan["runs"], "seconds": needs.seconds}})
-    caption = "Targets of table 2."
-    out.table(["target", "table 2", "here: ground range x azimuth x height, m", "facets"], sizes, caption, text=True)
-    out.table(
-        ["target", "cells of the grid", "time steps", "GiB per run", "runs", "minutes per run", "hours"],
-        full,
-        f"What the sizes of the paper take with at least {CELLS[False]} cells per shortest wavelength and "
-        f"{FULL_BYTES / 1e9:g} GB for a run, forecast for this machine at its present speed "
-        "(sarcl.plan). Figure 8 takes 18 runs more for cuboid and "
-        "sharp cone each.",
-    )
+    out.table("Targets of table 2", sizes, text=True)
+    out.table("What the sizes of the paper take", full, cells=CELLS[False], gigabytes=FULL_BYTES / 1e9)

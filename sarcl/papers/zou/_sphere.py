@@ -28,7 +28,7 @@ def optics_of_sphere(radius: float, k: np.ndarray) -> np.ndarray:
 
 def section(lab: Lab) -> Section:
     """Echoes and image of the sphere."""
-    out = Section("mie", "The sphere against Mie's series")
+    out = Section.of("zou", "mie")
     both = lab.full_wave("sphere")
     raw = both.select(polarization="HH")
     f = raw.frequency[0] + raw.frequency_step[0] * np.arange(raw.n_samples)
@@ -36,24 +36,15 @@ def section(lab: Lab) -> Section:
     mie = np.array([conducting_sphere(a, 2 * np.pi * v / SPEED_OF_LIGHT)[0] for v in f])
     samples = raw.read(0, raw.n_rows)
     apart = float(np.linalg.norm(samples - mie) / (np.linalg.norm(mie) * np.sqrt(raw.n_rows)))
-    item = "sphere: echoes in HH against Mie's series"
-    rule = f"complex error over all pulses and frequencies below {ECHO_ERROR:.0%}"
-    out.states(
-        item, "Mie", "exact", f"differ by {apart:.1%}", apart < ECHO_ERROR, value=apart, rule=rule, basis="theory"
-    )
+    out.states("sphere: echoes in HH against Mie's series", apart, apart < ECHO_ERROR, echo_error=ECHO_ERROR)
     optics = np.asarray(lab.optics("sphere").samples)
     closed = optics_of_sphere(a, 2 * np.pi * f / SPEED_OF_LIGHT)
     off = float(np.linalg.norm(optics - closed) / (np.linalg.norm(closed) * np.sqrt(len(optics))))
-    item = "sphere: echoes of physical optics against their closed form"
-    source = "currents of the lit half of a sphere"
-    rule = f"complex error over all pulses and frequencies below {OPTICS_ERROR:.0%}: the sphere has flat facets"
-    out.states(item, source, "exact", f"differ by {off:.1%}", off < OPTICS_ERROR, value=off, basis="theory", rule=rule)
+    holds = off < OPTICS_ERROR
+    out.states("sphere: echoes of physical optics against their closed form", off, holds, optics_error=OPTICS_ERROR)
     cross = both.select(polarization="VH").read(0, raw.n_rows)
     level = float(20 * np.log10(np.linalg.norm(cross) / np.linalg.norm(samples)))
-    out.states(
-        "sphere: VH over HH", "Mie", "no VH", f"{level:.0f} dB", level < -40, value=level, rule="below -40 dB",
-        basis="theory",
-    )  # fmt: skip
+    out.states("sphere: VH over HH", level, level < -40)
     grid = lab.radar.grid((0.6, radius(lab.scene("sphere"))), SPACING)
     cuts, peaks = [], []
     for name, data in (("full wave", raw), ("Mie's series", at_pulses(raw, np.tile(mie, (raw.n_rows, 1))))):
@@ -65,22 +56,18 @@ def section(lab: Lab) -> Section:
         low, mid, high = cut[i - 1 : i + 2]
         peaks.append((20 * np.log10(mid), range_[i] + SPACING * (high - low) / (2 * (2 * mid - low - high))))
         cuts.append((name, range_, 20 * np.log10(np.maximum(cut, 1e-6))))
-    for item, i, within, unit, form in (
-        ("sphere: brightest pixel, HH", 0, PEAK_ERROR, "dB re 1 m²", ".2f"),
-        ("sphere: slant range of the brightest place", 1, PLACE_ERROR, "m", ".3f"),
-    ):
-        out.number(item, "Mie", peaks[1][i], peaks[0][i], within, unit, form, basis="theory")
-    out.say(
-        f"The sphere has a radius of {a:g} m. Its front is imaged at {peaks[0][1]:.2f} m. The wave that creeps round "
-        f"it appears {np.pi / 2 * a:.2f} m behind its centre or a little later."
-    )
-    caption = "Cut along slant range through the image of the sphere, HH."
-    out.plot(cuts, "slant range about the centre, m", "dB re 1 m²", caption)
+    items = ("sphere: brightest pixel, HH", PEAK_ERROR), ("sphere: slant range of the brightest place", PLACE_ERROR)
+    for (item, within), measured, exact in zip(items, *peaks, strict=True):
+        out.number(item, measured, expected=exact, within=within)
+    out.say(a=a, front=peaks[0][1], creeping=np.pi / 2 * a)
+    out.plot("Cut along slant range through the image", cuts)
     pulses = f / 1e9
     out.plot(
-        [("full wave, mean over pulses", pulses, 20 * np.log10(np.sqrt((np.abs(samples) ** 2).mean(axis=0)))),
-         ("Mie's series", pulses, 20 * np.log10(np.abs(mie)))],
-        "frequency, GHz", "radar cross section, dB re 1 m²", "Radar cross section of the sphere over the band, HH.",
-    )  # fmt: skip
+        "Radar cross section of the sphere",
+        [
+            ("full wave, mean over pulses", pulses, 20 * np.log10(np.sqrt((np.abs(samples) ** 2).mean(axis=0)))),
+            ("Mie's series", pulses, 20 * np.log10(np.abs(mie))),
+        ],
+    )
     out.keep(error=apart, cross_db=level, ka=[float(2 * np.pi * v * a / SPEED_OF_LIGHT) for v in (f[0], f[-1])])
     return out

@@ -13,7 +13,7 @@ CROSS, NEAR = -40.0, 10.0  # dB: VH over HH in amplitude as printed, and how nea
 
 def section(lab: Lab) -> Section:
     """All targets that have been imaged."""
-    out = Section("summary", "The six targets: polarisation, physical optics, time")
+    out = Section.of("zou", "summary")
     rows, cross = [], {}
     imaged = [target for target in _targets.TARGETS if target.name in lab.levels]
     for target in imaged:
@@ -25,39 +25,20 @@ def section(lab: Lab) -> Section:
             f"{_db(level.rms[1] / level.rms[0]):.0f}", len(plan["anchors"]), plan["runs"],
             f"{sum(report.seconds.values()):.0f}",
         ])  # fmt: skip
-    out.table(
-        ["target", "HH, full wave, dB re 1 m²", "HH, physical optics, dB re 1 m²", "echoes differ by",
-         "VH over HH, image, dB", "VH over HH, echoes, dB", "anchors", "runs of the grid", "s"],
-        rows, "Brightest pixels, difference of the echoes of physical optics from those of full wave (rms over the rms "
-        "of full wave), polarisation, and what the full-wave echoes took.",
-    )  # fmt: skip
+    out.table("Brightest pixels", rows)
     others = np.array([v for name, v in cross.items() if name != "sphere"])
     middle = float(np.median(others))
+    out.words = {"least": others.min(), "most": others.max(), "near": NEAR, "cross": CROSS}
     item = "VH over HH, brightest pixels of the targets but the sphere"
-    expected = "about two orders of magnitude"
-    measured = f"{others.min():.0f} to {others.max():.0f} dB, median {middle:.0f}"
-    why = (
-        "bodies of revolution and boxes seen broadside have little VH by symmetry: what there is comes from azimuths "
-        "off the middle and from edges; a sphere has none"
-    )
-    rule = f"median within {NEAR:.0f} dB of {CROSS:.0f} dB"
-    source = "section 4"
-    out.states(
-        item, source, expected, measured, abs(middle - CROSS) < NEAR, why, middle, rule=rule, cause="interpretation"
-    )
+    out.states(item, middle, abs(middle - CROSS) < NEAR)
     edged = [target.name for target in imaged if target.name != "sphere"]
     differ = np.array([lab.levels[name].apart for name in edged])
     reports = [report_of(lab.full_wave(name))[0] for name in edged]
     uncertain = np.array([(report.predicted_error or 0.0) + (report.model_error or 0.0) for report in reports])
-    out.states(
-        "physical optics against full wave, targets with edges",
-        "abstract",
-        "imprecise for fine structures at low frequencies",
-        ", ".join(f"{name} {d:.0%} (full wave {u:.0%})" for name, d, u in zip(edged, differ, uncertain, strict=True)),
-        (differ > uncertain).all(),
-        value=differ,
-        rule="difference of the echoes above the predicted error of full wave, for each of them",
-    )
+    errors = zip(edged, differ, uncertain, strict=True)
+    measured = ", ".join(f"{name} {d:.0%} (full wave {u:.0%})" for name, d, u in errors)
+    item = "physical optics against full wave, targets with edges"
+    out.states(item, differ, (differ > uncertain).all(), measured=measured)
     out.keep(cross_over_co_db=cross, optics_differs={name: level.apart for name, level in lab.levels.items()})
     return out
 

@@ -12,5 +12,3 @@ For this folder alone:
     _curvature         height of the curved surface over its flat facets
     _curved_echo       echo of the curved surface
 """
-
-__all__ = ["facet_error", "facet_groups", "speckle_contrast"]

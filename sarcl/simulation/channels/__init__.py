@@ -12,5 +12,3 @@ For this folder alone:
     _response_samples      how echoes change from position to position in the array
     _separate              layout of channels in the samples; echoes computed channel by channel
 """
-
-__all__ = ["array_channels"]

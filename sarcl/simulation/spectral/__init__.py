@@ -29,5 +29,3 @@ For this folder alone:
     _stationary_phase       the transfer function of SARAS, by stationary phase
     _straight_track         straight, evenly spaced tracks; azimuth and slant range of scatterers
 """
-
-__all__ = ["spectral_echo", "spectral_parts", "spectral_task"]

@@ -10,7 +10,7 @@ from helpers.cases import image_error, noise_on
 from helpers.devices import as_gpu
 
 import sarcl
-from sarcl.imaging.range_doppler import _along_track, _focus
+from sarcl.imaging.range_doppler import _focus
 from sarcl.imaging.range_doppler._plan import FocusPlan
 
 
@@ -27,7 +27,7 @@ def test_sums_are_those_of_the_equation(n, sign):
     random = np.random.default_rng(n)
     values = (random.normal(size=(n, 3)) + 1j * random.normal(size=(n, 3))).astype(np.complex64)
     places, wanted, period = random.integers(-900_000, 900_000, n), np.array([-7, 0, 4, 123_456]), 333_000
-    found = _along_track.sums(values, places, wanted, period, sign)
+    found = _focus.sums(values, places, wanted, period, sign)
     exact = np.exp(sign * 2j * np.pi * np.outer(wanted, places) / period) @ values
     assert np.linalg.norm(found - exact) <= 4e-7 * np.linalg.norm(exact)
 

@@ -12,8 +12,7 @@ from helpers.cases import noise_on
 import sarcl
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.imaging.range_doppler._aperture_window import ApertureWindow
-from sarcl.imaging.range_doppler._gain import gain_of
-from sarcl.imaging.range_doppler.range_doppler import _row_weights
+from sarcl.imaging.range_doppler.range_doppler import _row_weights, gain_of
 from sarcl.numerics import windows
 
 TAYLOR = ("taylor", 35, 5)

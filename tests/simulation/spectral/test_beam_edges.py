@@ -10,7 +10,7 @@ import sarcl
 from sarcl import pointing
 from sarcl.model.antenna import Antenna
 from sarcl.reference import spectral_echo as twin
-from sarcl.reference.echo import echo as exact_echo
+from sarcl.reference.equations import point_echo as exact_echo
 from sarcl.scattering.antenna_weights import weights_of
 from sarcl.simulation.spectral import _edge_map as edge
 from sarcl.simulation.spectral._aspect_window import aspects, wavenumber

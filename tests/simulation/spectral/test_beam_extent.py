@@ -9,7 +9,7 @@ from helpers.cases import thinned
 import sarcl
 from sarcl import pointing
 from sarcl.model.antenna_pattern import two_way_gain
-from sarcl.reference.echo import echo as exact_echo
+from sarcl.reference.equations import point_echo as exact_echo
 from sarcl.scattering.antenna_weights import weights_of
 from sarcl.scattering.scatterers import Points
 from sarcl.simulation.spectral._beam_extent import beam_extent

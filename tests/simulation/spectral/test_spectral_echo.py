@@ -12,7 +12,7 @@ from helpers.devices import opened, variants
 
 import sarcl
 from sarcl import pointing
-from sarcl.reference.echo import echo as exact_echo
+from sarcl.reference.equations import point_echo as exact_echo
 
 CHIRP = sarcl.Waveform.chirp(center=9.6e9, bandwidth=150e6, duration=2e-6)
 TRACK = sarcl.Trajectory.line(start=(0, -60, 6e3), velocity=(0, 100, 0), prf=250, n_pulses=300)

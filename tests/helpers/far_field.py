@@ -12,9 +12,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from . import dispersion
-from .currents import Currents
-from .lattice import COURANT
+from sarcl.fullwave import dispersion
+from sarcl.fullwave.currents import Currents
+from sarcl.fullwave.lattice import COURANT
 
 
 def amplitude(currents: Currents, direction: np.ndarray, polarization: np.ndarray) -> np.ndarray:

@@ -3,35 +3,31 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...base.constants import SPEED_OF_LIGHT
-from ...base.rows import groups, spread_over
-from ...base.vectors import dot
-from ...model.phase_history import PhaseHistory
-from ...numerics import interpolation
-from ...numerics.pulse_geometry import PulseGeometry
+from ..base.constants import SPEED_OF_LIGHT
+from ..base.rows import spread_over
+from ..base.vectors import dot
+from . import interpolation
+from .pulse_geometry import PulseGeometry
 
 GAP = 5.0  # a step between pulses that is this many times longer than the median begins a new run
 
 
-def runs_of(raw: PhaseHistory) -> tuple[np.ndarray, list[tuple[int, int]]]:
-    """An order of the rows, (n,), in which the rows of a run are consecutive; and the runs (first, last).
+def smooth_runs(tx: np.ndarray, rx: np.ndarray, group: np.ndarray | None = None) -> list[tuple[int, int]]:
+    """Runs (first, stop) of pulses that follow one another without a gap in the track.
 
-    A run is smooth: its rows share channel and frequency, and follow one another without a gap in the track.
+    tx, rx  positions, m (n, 3);  group  (n,): pulses of a run have the same number; None: all have
     """
-    channel = raw.tx_channel, raw.rx_channel, raw.polarization
-    group = groups(raw.n_rows, raw.frequency, raw.frequency_step, *channel)
-    time = np.arange(raw.n_rows) if raw.time is None else raw.time
-    order = np.lexsort((np.arange(raw.n_rows), time, group))
-    step = np.abs(np.diff(raw.tx[order], axis=0)).sum(axis=1) + np.abs(np.diff(raw.rx[order], axis=0)).sum(axis=1)
+    step = np.abs(np.diff(tx, axis=0)).sum(axis=1) + np.abs(np.diff(rx, axis=0)).sum(axis=1)
     usual = float(np.median(step)) if len(step) else 0.0
-    cut = np.flatnonzero((np.diff(group[order]) != 0) | (step > GAP * usual)) + 1
-    edges = [0, *cut.tolist(), raw.n_rows]
-    return order, list(itertools.pairwise(edges))
+    is_cut = step > GAP * usual
+    if group is not None:
+        is_cut |= np.diff(group) != 0
+    edges = [0, *(np.flatnonzero(is_cut) + 1).tolist(), len(tx)]
+    return list(itertools.pairwise(edges))
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +46,13 @@ class Decimation:
     blocks: np.ndarray
     filter: np.ndarray
     error: float
+
+    @property
+    def neighbours(self) -> np.ndarray:
+        """First kept pulse around each pulse, and the row of the filter that weighs it and the next: int32 (n, 2)."""
+        first, count, kept, row = self.blocks.T
+        along = np.arange(count.sum()) - np.repeat(first - first[0], count)
+        return np.stack([np.repeat(kept, count), np.repeat(row, count) + along], axis=1).astype(np.int32)
 
 
 def decimated(track: PulseGeometry, ratio: int, taps: int, oversample: float) -> Decimation:
@@ -101,15 +104,21 @@ def _positions(run: np.ndarray, at: np.ndarray) -> np.ndarray:
 
 
 def rate(track: PulseGeometry, points: np.ndarray, axes: np.ndarray | None) -> float:
-    """Largest change of the gradient of range at points, m (n, 3), from one row to the next; no unit.
+    """Largest change of the gradient of range at points, m (n, 3), from one row to the next; see `rates`."""
+    return float(rates(track, points, axes).max(initial=0.0))
+
+
+def rates(track: PulseGeometry, points: np.ndarray, axes: np.ndarray | None, most: int = 512) -> np.ndarray:
+    """Largest change of the gradient of range at each of the points, m (n, 3), from one row to the next; no unit.
 
     axes  unit vectors (2, 3) of the plane that the pixels lie in, or None for pixels anywhere
+    most  pulses of a run at which it is computed
     """
-    worst = 0.0
+    largest = np.zeros(len(points))
     for begin, end in track.runs:
         if end - begin < 2:
             continue
-        rows = begin + spread_over(end - begin - 1, 512)
+        rows = begin + spread_over(end - begin - 1, most)
         change = np.zeros((len(points), len(rows), 3))
         for antenna in track.ends:
             directions = []
@@ -118,49 +127,54 @@ def rate(track: PulseGeometry, points: np.ndarray, axes: np.ndarray | None) -> f
                 directions.append(d / np.maximum(np.linalg.norm(d, axis=-1, keepdims=True), 1e-9))
             change += (directions[1] - directions[0]) / len(track.ends)
         seen = change if axes is None else change @ axes.T
-        worst = max(worst, float(np.linalg.norm(seen, axis=-1).max()))
-    return worst
+        np.maximum(largest, np.linalg.norm(seen, axis=-1).max(axis=1), out=largest)
+    return largest
 
 
 def filter_error(
     track: PulseGeometry,
-    made: Decimation,
+    decimation: Decimation,
     centers: np.ndarray,
     radius: float,
     frequency: float,
-    axes: np.ndarray | None,
+    axes: np.ndarray | None = None,
+    directions: np.ndarray | None = None,
 ) -> float:
-    """Largest relative error of a pulse made from the kept ones, `radius` m away from each of `centers`, m (m, 3).
+    """Largest relative error of a pulse that the kept ones make, `radius` m away from each of `centers`, m (m, 3).
 
+    axes        unit vectors (2, 3) of the plane in which points lie;  directions  of points from the centres, unit
+                vectors (n, 3), in place of those along the coordinates, or in the plane
     Computed for the track as it is, not for a smooth one: for the pulses of 32 blocks spread over the track, and for
     the 1024 pulses where the track deviates most from a smooth one.
     """
-    directions = np.concatenate([np.eye(3), -np.eye(3)])
+    if directions is None:
+        directions = np.concatenate([np.eye(3), -np.eye(3)])
     if axes is not None:
         angle = 2 * np.pi * np.arange(8) / 8
         directions = np.cos(angle)[:, None] * axes[0] + np.sin(angle)[:, None] * axes[1]
-    blocks = made.blocks
+    blocks = decimation.blocks
     spread = spread_over(len(blocks), 32)
-    within = spread_over(made.ratio, 64)
+    within = spread_over(decimation.ratio, 64)
     usual = (blocks[spread, :1] + np.minimum(within, blocks[spread, 1:2] - 1)).ravel()
-    pulses = np.unique(np.concatenate([usual, _roughest(track, made, centers[len(centers) // 2])]))
+    pulses = np.unique(np.concatenate([usual, _roughest(track, decimation, centers[len(centers) // 2])]))
     block = blocks[np.searchsorted(blocks[:, 0], pulses, side="right") - 1]
-    kept = block[:, 2:3] + np.arange(made.filter.shape[1])
-    filters, worst = made.filter.astype(np.float64)[block[:, 3] + pulses - block[:, 0]], 0.0
+    kept = block[:, 2:3] + np.arange(decimation.filter.shape[1])
+    filters, worst = decimation.filter.astype(np.float64)[block[:, 3] + pulses - block[:, 0]], 0.0
     for center in centers:
         points = center + radius * directions
         exact = _phases(track, pulses, points, center, frequency)
-        phases = _phases(made.kept, kept, points, center, frequency)
+        phases = _phases(decimation.kept, kept, points, center, frequency)
         worst = max(worst, float(np.abs(np.einsum("pn,pnm->pm", filters, phases) - exact).max()))
     return worst
 
 
-def _roughest(track: PulseGeometry, made: Decimation, center: np.ndarray, most: int = 1024) -> np.ndarray:
+def _roughest(track: PulseGeometry, decimation: Decimation, center: np.ndarray, most: int = 1024) -> np.ndarray:
     """Pulses whose direction from `center` deviates most from linear interpolation between the kept pulses."""
-    first, count, before = made.blocks[:, 0], made.blocks[:, 1], made.blocks[:, 2] + made.filter.shape[1] // 2 - 1
-    way = ((np.arange(len(track)) - np.repeat(first, count)) / made.ratio)[:, None]
+    first, count, row, _ = decimation.blocks.T
+    before = row + decimation.filter.shape[1] // 2 - 1
+    way = ((np.arange(len(track)) - np.repeat(first, count)) / decimation.ratio)[:, None]
     before, off = np.repeat(before, count), np.zeros(len(track))
-    for antenna, ends in zip(track.ends, made.kept.ends, strict=True):
+    for antenna, ends in zip(track.ends, decimation.kept.ends, strict=True):
         pulses, kept = _directions(antenna, center), _directions(ends, center)
         apart = pulses - (1 - way) * kept[before] - way * kept[before + 1]
         off = np.maximum(off, dot(apart, apart))
@@ -185,17 +199,3 @@ def _phases(
         grown = (x**2).sum(axis=1) - 2 * along
         path += grown / (near + np.sqrt(near**2 + grown)) / len(track.ends)
     return np.exp(4j * np.pi * frequency / SPEED_OF_LIGHT * path)
-
-
-def chains(leaf: int, largest: int) -> Iterator[tuple[int, ...]]:
-    """Sides of the tiles of each level, from the root to the leaf: ratios of 2 to 16, at most four levels."""
-    yield (leaf,)
-    for ratio in (2, 4, 8, 16):
-        if leaf * ratio >= 2 * largest:
-            return
-        yield (leaf * ratio, leaf)
-        for second in (4, 8, 16):
-            if leaf * ratio * second < 2 * largest:
-                yield (leaf * ratio * second, leaf * ratio, leaf)
-                if leaf * ratio * second * 8 < 2 * largest:
-                    yield (leaf * ratio * second * 8, leaf * ratio * second, leaf * ratio, leaf)

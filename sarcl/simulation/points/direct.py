@@ -7,20 +7,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.stage_timer import Clock
-from ..model.waveform import Waveform
-from ..numerics import range_profiles
-from ..numerics.device_profiles import SpreadSamples
-from ..numerics.plan import Plan
-from ..numerics.polynomials import lagrange
-from ..numerics.pulse_geometry import PulseGeometry
-from ..numerics.tile_constants import TileConstants
-from ..opencl.device import Device
-from ..opencl.launch_numbers import launch_numbers
-from ..scattering.antenna_weights import AntennaWeights
-from ..scattering.scatterers import Points
-from ._kernel_images import sample_patches
-from .spreading import GROUP, ChannelView, Counts, HostTiling, TiledScatterers, is_grouped, most_pulses, splits, terms
+from ...base.stage_timer import Clock
+from ...model.waveform import Waveform
+from ...numerics import range_profiles
+from ...numerics.device_profiles import SpreadSamples
+from ...numerics.plan import Plan
+from ...numerics.polynomials import lagrange
+from ...numerics.pulse_geometry import PulseGeometry
+from ...numerics.tile_constants import TileConstants
+from ...opencl.device import Device
+from ...opencl.launch_numbers import launch_numbers
+from ...scattering.antenna_weights import AntennaWeights
+from ...scattering.scatterers import Points
+from ..kernel_images import sample_patches
+from ..spreading import GROUP, ChannelView, Counts, HostTiling, TiledScatterers, is_grouped, most_pulses, splits, terms
 
 
 def tiled_points(
