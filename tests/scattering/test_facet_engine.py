@@ -55,7 +55,7 @@ def test_a_five_metre_plate_tilted_by_20_degrees(distance, elevation, tolerance)
 @pytest.mark.parametrize("material, bistatic", thinned([Material(), WET, Material(eps_r=3.0)], [True, False]))
 def test_every_polarisation_of_tilted_facets(device, material, bistatic):
     random = np.random.default_rng(3)
-    corners = random.uniform(-4, 4, (5, 1, 3)) + random.uniform(-0.6, 0.6, (5, 3, 3))
+    corners = random.uniform(-4, 4, (12, 1, 3)) + random.uniform(-0.6, 0.6, (12, 3, 3))
     scene = sarcl.Scene.facets(corners, material=material, two_sided=False)
     tx, rx = seen_from(5e3, 0.7, 0.2), seen_from(6e3, 0.9, 0.8)
     options = {"receiver": still(rx)} if bistatic else {}
@@ -264,7 +264,7 @@ def test_polarisations_lie_about_the_vertical_in_earth_centred_coordinates_too()
     from sarcl.base import wgs84
 
     random = np.random.default_rng(8)
-    corners = random.uniform(-4, 4, (3, 1, 3)) + random.uniform(-0.3, 0.3, (3, 3, 3))
+    corners = random.uniform(-4, 4, (8, 1, 3)) + random.uniform(-0.3, 0.3, (8, 3, 3))
     ends = np.array([seen_from(8e3, 0.8, a) for a in (0.3, 0.31)])
     axes, origin = wgs84.local_axes(12.0, 42.0), wgs84.ecef(12.0, 42.0, 100.0)
     options = {"polarization": "all", "shadows": False, "tolerance": 1e-4, "check": False, "range_window": (-12, 12)}

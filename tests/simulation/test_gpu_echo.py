@@ -91,7 +91,7 @@ def test_rows_that_work_groups_add_up_are_those_of_single_work_items(device, sce
 @pytest.mark.parametrize(
     "options",
     [
-        {"shadows": True, "max_edge": 0.5, "tolerance": 1e-2},
+        {"shadows": True, "max_edge": 0.5},
         pytest.param({"shadows": False, "max_edge": 0.5, "polarization": "all"}, marks=pytest.mark.slow),
         pytest.param(
             {
@@ -106,9 +106,9 @@ def test_rows_that_work_groups_add_up_are_those_of_single_work_items(device, sce
     ids=["shadows", "channels", "beam"],
 )
 def test_facets_that_work_groups_add_up_are_those_of_single_work_items(device, options):
-    axis = np.linspace(-4, 4, 9)
-    scene = sarcl.Scene.from_heights(axis, axis, np.random.default_rng(0).normal(size=(9, 9)) * 0.3)
-    track = sarcl.pointing.spotlight(TRACK.picked(slice(0, 9)), (0, 0, 0))
+    axis = np.linspace(-4, 4, 6)
+    scene = sarcl.Scene.from_heights(axis, axis, np.random.default_rng(0).normal(size=(6, 6)) * 0.3)
+    track = sarcl.pointing.spotlight(TRACK.picked(slice(0, 5)), (0, 0, 0))
     made = {}
     for grouped, gpu in with_and_without_groups(device).items():
         made[grouped] = sarcl.echo(
