@@ -3,6 +3,7 @@
 For other folders:
 
     backproject    the command
+    exact          the exact sum at some pixels
     fastsar_peer   runs in another environment, and imports nothing of sarcl
     one_shot       one image in a process of its own: python -m sarcl.bench.one_shot
     pareto         plot of rate against achieved error; needs the extra `plots`
@@ -14,7 +15,6 @@ For this folder alone:
     _baseline      backprojection written in NumPy
     _cases         data of the benchmark
     _competitor    a program that is measured, and one run of it
-    _exact         the exact sum at some pixels
     _measure       runs and times the competitors in turns
     _peers         libraries in another environment, through a pipe
     _run_sarcl     sarcl as a competitor

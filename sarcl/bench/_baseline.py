@@ -8,7 +8,7 @@ import numpy as np
 
 from ..base.constants import SPEED_OF_LIGHT
 from ..model.phase_history import PhaseHistory
-from . import _exact
+from . import exact
 from ._cases import BenchCase
 from ._competitor import Competitor, Reading
 
@@ -45,5 +45,5 @@ def competitors(case: BenchCase) -> list[Competitor]:
         return Reading(image[case.at[0], case.at[1]], {"call": seconds, "form": seconds, "cpu": busy})
 
     setting = f"linear, {FINER} x" + (f"; {rows} pulses, seconds times {case.n / rows:.0f}" if rows < case.n else "")
-    check = _exact.backproject(raw, case.grid.at(*case.at))
+    check = exact.backproject(raw, case.grid.at(*case.at))
     return [Competitor("NumPy", "one thread", "direct", setting, run, check=check, share=rows / case.n)]

@@ -13,7 +13,7 @@ from ..base.validation import choice, count
 from ..model.image_grid import ImageGrid
 from ..model.phase_history import PhaseHistory
 from ..model.trajectory import Trajectory
-from . import _exact
+from . import exact
 
 FREQUENCY = 9.3e9  # Hz, of sample 0
 N_POINTS = 400
@@ -85,11 +85,11 @@ def make(scene: str, n: int, data: str | None = None, pixels: int = 1024) -> Ben
         positions = np.zeros((N_POINTS, 3))
         positions[:, :2] = (random.random((N_POINTS, 2)) - 0.5) * 0.98 * n * spacing
         amplitudes = random.standard_normal((N_POINTS, 2)).view(np.complex128)[:, 0]
-        samples = _exact.echo(tx, reference, FREQUENCY, step, n, positions, amplitudes)
+        samples = exact.echo(tx, reference, FREQUENCY, step, n, positions, amplitudes)
     raw = PhaseHistory(samples, frequency=FREQUENCY, frequency_step=step, tx=tx, reference_range=reference)
     grid = ImageGrid.plane(shape=(n, n), spacing=spacing)
     at = np.random.default_rng(1).integers(0, n, (2, count("pixels", pixels)))
-    return BenchCase(scene, data, n, raw, grid, at, *_exact.backproject(raw, grid.at(*at)))
+    return BenchCase(scene, data, n, raw, grid, at, *exact.backproject(raw, grid.at(*at)))
 
 
 def save(case: BenchCase, folder: Path) -> None:

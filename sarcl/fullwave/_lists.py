@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..opencl.device import Device
-from ._incident import AFTER, BEFORE, Entrance, WaveTable
+from .incident import AFTER, BEFORE, Entrance, WaveTable
 from .lattice import LANES, GroupOrder, Lattice
 from .target import Target
 

@@ -13,8 +13,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..opencl.device import Device
-from ._currents import Currents
-from ._formed_echoes import formed_echoes
+from .currents import Currents
+from .formed_echoes import formed_echoes
 from .lattice import Lattice
 from .target import Target
 

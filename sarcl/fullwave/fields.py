@@ -13,14 +13,14 @@ import numpy as np
 
 from ..opencl.device import Device
 from ..opencl.launch_numbers import launch_numbers
-from ._absorber import layers
-from ._incident import COMPONENTS, SILENT, WaveTable, entrances
 from ._lists import SAMPLES, CoupledList, IncidentList, TargetList, heard
+from .absorber import layers
+from .incident import COMPONENTS, SILENT, WaveTable, entrances
 from .lattice import COURANT, LANES, ROWS, Lattice
 from .target import Target
 
 BLOCK = 8  # steps of a block, which is done tile by tile
-PERIODS = (8, 4, 2)  # steps between two samples of the residuals, where the pulse allows (_currents:sample_period)
+PERIODS = (8, 4, 2)  # steps between two samples of the residuals, where the pulse allows (currents:sample_period)
 TILE = 16  # planes per tile on a CPU
 WAVE_STEPS = 64  # steps of the incident wave that are on the device at a time: a multiple of BLOCK
 VECTORS = 16  # vectors per work-item of a transform on a CPU

@@ -10,17 +10,17 @@ import numpy as np
 from ..base.constants import SPEED_OF_LIGHT
 from ..base.vectors import unit
 from ..opencl.device import Device
-from ._currents import currents
-from ._formed_echoes import formed_echoes
-from ._incident import COMPONENTS, SPACING, PlaneWave
 from ._lists import PARTS, SAMPLES
 from ._mirrors import Twin as Twin
 from ._mirrors import mirror_axes, mirrored_echoes, twins
-from ._pulse import Pulse
 from .bodies.materials import RIM as RIM
 from .bodies.materials import Body, bodies
+from .currents import currents
 from .fields import WAVE_STEPS
+from .formed_echoes import formed_echoes
+from .incident import COMPONENTS, SPACING, PlaneWave
 from .lattice import COURANT, LANES, ROWS, Lattice
+from .pulse import Pulse
 from .target import Target
 
 ABSORBER, GAP, SPARE = 10, 3, 2  # cells on each side: absorbing layers, to the incident wave's box, to the target
@@ -61,7 +61,7 @@ class RunCost:
 
 @dataclass(frozen=True)
 class RunEnd:
-    """How runs ended: steps done, and the largest part of the currents that was left (_currents)."""
+    """How runs ended: steps done, and the largest part of the currents that was left (currents)."""
 
     steps: int
     left: float
@@ -118,7 +118,7 @@ def run_bytes(
     shape: np.ndarray, edges: float, faces: float, frequencies: int, *, gap: int = GAP, absorber: int = ABSORBER,
     conductor: bool = True,
 ) -> tuple[float, float]:  # fmt: skip
-    """Bytes of the buffers of a run, and with them those of its NumPy arrays at most: _currents:currents.
+    """Bytes of the buffers of a run, and with them those of its NumPy arrays at most: currents:currents.
 
     shape      cells along x, y and z;  edges, faces  of the target;  frequencies  of its phasors
     conductor  no edge is of another material

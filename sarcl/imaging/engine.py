@@ -17,8 +17,6 @@ from ..opencl.pipeline import Pipeline
 from .focusing_task import FocusingTask
 from .tiling.tiling import FlatImage, Run, Tiling
 
-UPLOAD = 2**26  # bytes of samples of a block on a GPU: while it computes with these, the host uploads as many
-
 
 @dataclass(frozen=True)
 class Skipped:
@@ -173,11 +171,11 @@ class RowProfiles:
         return self._maker.rows_in(nbytes) if self._maker else int(nbytes / self._row_bytes)
 
     def most_rows(self, on_cpu: int, on_others: int) -> int:
-        """Most rows of a block, whatever the memory: as given, and on GPUs about UPLOAD bytes of samples."""
+        """Most rows of a block, whatever the memory: as given, and on GPUs about `limits.upload` bytes of samples."""
         if self.device.is_cpu:
             return on_cpu
         sample_bytes = self.task.raw.samples.dtype.itemsize * self.task.raw.n_samples
-        return max(1, min(on_others, UPLOAD // sample_bytes))
+        return max(1, min(on_others, self.device.limits.upload // sample_bytes))
 
     def upload(self, start: int, stop: int) -> Buffer:
         """Buffer of the profiles (stop - start, stride) of rows start ... stop - 1."""

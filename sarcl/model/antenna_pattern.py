@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -114,6 +115,7 @@ def _table(antenna: Antenna, x: np.ndarray, y: np.ndarray, z: np.ndarray, freque
     return np.asarray((real + 1j * imag) * inside)
 
 
+@functools.lru_cache(maxsize=4)  # antennas are compared as objects: planners evaluate one thousands of times
 def splines(antenna: Antenna) -> tuple[Any, Any]:
     """Bicubic (not-a-knot) splines of a table's real and imaginary parts over azimuth and elevation."""
     from scipy.interpolate import RectBivariateSpline

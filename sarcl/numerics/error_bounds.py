@@ -1,6 +1,6 @@
 """Error formulas: numbers in, numbers out. Every bound is a worst case, relative, and small errors add.
 
-docs/theory/accuracy.md derives each; tests/numerics/test_accuracy.py and tests/imaging/test_precise.py measure each.
+docs/theory/accuracy.md derives each; tests/numerics/test_accuracy.py and tests/imaging/test_float64.py measure each.
 """
 
 from __future__ import annotations

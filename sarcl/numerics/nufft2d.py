@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
 
 OVERSAMPLE = (1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0)
-UPLOAD = 2**26  # bytes of samples that are uploaded at a time where a device holds the whole grid
 MOST_COUNTED = 2**20  # samples that are counted to find the most in a cell
 CELLS = 64, 8  # cells per side of a tile of one work-item: on CPUs it stays in a cache, on GPUs many are at work
 
@@ -188,7 +187,8 @@ class Gridder:
             grid, half = 8.0 * length[0] * length[1], 8.0 * shape[1] * length[0]
             left = budget - end.nbytes - grid
             if left >= sample_row and max(grid, half) <= device.info.max_alloc:
-                return end, (n_tiles, max(1, int(min(left, n_rows * sample_row, UPLOAD) // sample_row)))
+                most = min(left, n_rows * sample_row, device.limits.upload)
+                return end, (n_tiles, max(1, int(most // sample_row)))
             end = OnDevice(device, length, flat, WORK * budget, False)
             if end.nbytes + end.across(self.tile) + sample_row <= budget:
                 return end, self._divided(budget, end, sample_row)

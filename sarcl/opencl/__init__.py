@@ -12,6 +12,7 @@ For other folders:
     launch_numbers  numbers of a kernel's launch as one struct by value, given by name
     memory_budget  bytes that a computation may take on a device
     pipeline       blocks of work on a device: the upload of one while the device works on the one before
+    programs       source texts of kernels, and precautions for building programs
 
 For this folder alone:
 
@@ -23,5 +24,4 @@ For this folder alone:
     _queries       questions to a driver, each guarded
     _trial         kernels whose results are known, which a device must pass
     _trial_record  results of devices' trials, on disk
-    _programs      source texts of kernels, and precautions for building programs
 """

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..base import float_pairs
 from ..base.text import first_line, size_text
-from ._programs import build, kernels_of, quiet, source
+from .programs import build, kernels_of, quiet, source
 
 if TYPE_CHECKING:
     import pyopencl

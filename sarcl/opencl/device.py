@@ -7,7 +7,7 @@ import os
 import threading
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,9 +16,9 @@ from ..base.text import first_line, size_text
 from ..base.threads import threads
 from ._host_arrays import HostArrays
 from ._launches import Launches, fixed_axes
-from ._programs import build, kernels_of, names_in, quiet, source
 from .device_list import DeviceInfo
 from .failures import buffer_bytes, explained
+from .programs import build, kernels_of, names_in, quiet, source
 
 if TYPE_CHECKING:
     import pyopencl
@@ -26,10 +26,22 @@ if TYPE_CHECKING:
 else:
     Buffer = Any  # in annotations alone: pyopencl is loaded with the first device
 
-# A launch of a struct and 16 buffers takes 33 us of processor time, and 23 us once pyopencl is told the struct's type;
-# one of 17 single numbers took 84 us untold. Telling it takes 0.4 ms, which kernels of few launches do not save.
-MANY_LAUNCHES = 20
 GROUP = 16  # work-items per group on a CPU (1 where the size does not divide by it), for kernels of any group size
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Sizes of what a device does at a time.
+
+    upload     bytes of samples that go up at a time to a GPU: it computes with these while the host uploads as many
+    transform  most samples of a batch of FFTs: they fill a GPU, and larger ones gain nothing
+    launches   of a kernel, after which pyopencl is told the types of its numbers. A launch of a struct and 16 buffers
+               then takes 23 us of processor time instead of 33 us; telling takes 0.4 ms
+    """
+
+    upload: int = 2**26
+    transform: int = 2**22
+    launches: int = 20
 
 
 class Device:
@@ -40,10 +52,10 @@ class Device:
     Several threads may use a device: launches take turns, as a kernel's arguments are set before it is enqueued.
     """
 
-    def __init__(self, info: DeviceInfo, raw: Any) -> None:
+    def __init__(self, info: DeviceInfo, raw: Any, limits: Limits = Limits()) -> None:
         import pyopencl
 
-        self.info = info
+        self.info, self.limits = info, limits
         self._raw = raw
         if info.kind == "cpu" and threads() < info.units and os.environ.get("SARCL_THREADS"):
             try:
@@ -230,7 +242,7 @@ class Device:
             count = self._counts[kernel] = self._counts.get(kernel, 0) + 1
             if count == 1 and kernel.num_args != len(given):  # some drivers end the process
                 raise TypeError(f"{kernel.function_name} takes {kernel.num_args} arguments, not {len(given)}")
-            if count == MANY_LAUNCHES:
+            if count == self.limits.launches:
                 kernel.set_scalar_arg_dtypes([_type_of(a) for a in given])
             self._arrays.enqueued += 1
             if self.is_cpu:
@@ -311,4 +323,4 @@ def once(make: Callable[..., Device]) -> Callable[..., Device]:
 
 @once
 def _twin(device: Device, **changes: Any) -> Device:
-    return Device(replace(device.info, **changes), device._raw)
+    return Device(replace(device.info, **changes), device._raw, device.limits)

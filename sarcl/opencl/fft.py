@@ -12,8 +12,8 @@ import numpy as np
 
 from ..base.threads import threads
 from ._launches import LASTS, lasted
-from ._programs import quiet
 from .device import Device
+from .programs import quiet
 
 if TYPE_CHECKING:
     from numpy.typing import DTypeLike
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from .device import Buffer
 
 
-AT_ONCE = 2**22  # most samples of a batch: they fill a GPU, and larger ones gain nothing
 # Multiplications with additions, at the speed of a device's trial, in whose time a launch takes a sample on: an FFT
 # waits for memory, so this is many times what it computes. Launches that take longer make the next batches smaller.
 SAMPLE = 200.0
@@ -84,7 +83,8 @@ def temporary_bytes(length: int, dtype: DTypeLike) -> int:
 
 def rows_at_once(device: Device, length: int) -> int:
     """Rows of a batch on a device, whose launches are short (_launches.LASTS) by the speed that was measured."""
-    samples = min(AT_ONCE, LASTS * device.info.rate / SAMPLE, _slow.get(device, AT_ONCE))
+    most = device.limits.transform
+    samples = min(most, LASTS * device.info.rate / SAMPLE, _slow.get(device, most))
     return max(1, int(samples) // length)
 
 

@@ -8,7 +8,7 @@ import re
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._programs import source
+from .programs import source
 
 TYPES = {"int": np.int32, "uint": np.uint32, "ulong": np.uint64, "float": np.float32}
 
@@ -20,7 +20,7 @@ def launch_numbers(file: str, kernel: str, **values: ArrayLike) -> np.ndarray:
 
     TypeError: values are missing, or the struct has no such members; OverflowError: an integer that is too large.
     """
-    layout = _layout(file, f"{kernel}_numbers")
+    layout = struct_layout(file, f"{kernel}_numbers")
     names = layout.names or ()
     given = tuple(values[name] for name in names if name in values)
     if len(given) != len(names) or len(values) != len(names):
@@ -30,7 +30,7 @@ def launch_numbers(file: str, kernel: str, **values: ArrayLike) -> np.ndarray:
 
 
 @functools.cache
-def _layout(file: str, struct: str) -> np.dtype:
+def struct_layout(file: str, struct: str) -> np.dtype:
     """Types and places of the members of a struct in a kernel's source text, as C lays them out."""
     found = re.search(r"typedef struct \{([^}]*)\} " + struct + ";", re.sub(r"//.*", "", source(file)))
     if found is None:

@@ -9,6 +9,7 @@ For other folders:
     facets                 facets ready for the kernel: subdivided, displaced, culled, illuminated
     physical_optics        phase integral, Fresnel coefficients and scattering matrix of a planar facet
     pulse_nodes            pulses at which amplitudes are computed, with cubic interpolation between them
+    random_surface         cells of rough facets, with a random height and amplitude each
     rough_pieces           rough facets cut on a device, where the kernels read the pieces
     scatterers             from a scene to the points and facets that the kernels add
     subdivision            facets cut to the edge length of their plan
@@ -21,6 +22,5 @@ For this folder alone:
     _facet_norm            norms of facets at random phases, coplanar neighbours as one: the gain of cutting
     _facet_sampling        random samples of the facets or points of a scene
     _frequency_nodes       frequencies at which amplitudes are computed
-    _random_surface        cells of rough facets, with a random height and amplitude each
     _rough_surface         scattering diagrams of rough facets (SARAS)
 """

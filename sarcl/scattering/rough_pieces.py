@@ -1,7 +1,7 @@
 """Pieces of a scene that is rough throughout: cut, placed and given their random numbers on a device, which reads them.
 
 The host works facet by facet, as they were given. Only what is asked for comes back: pieces of some facets, as samples
-for planners, or all, for sums in float64. The surface is that of _random_surface.py.
+for planners, or all, for sums in float64. The surface is that of random_surface.py.
 
 source   docs/theory/facets.md; kernels/facet_pieces.cl
 """
@@ -23,9 +23,9 @@ from ..scene.scene import Scene
 from ..scene.triangles import areas, centroids, cut, edges, normals, refuse_many, too_many
 from ..visibility.illumination import Illumination
 from . import facet_kinds
-from ._random_surface import RANDOM_STREAMS, ROUND, Pieces, pieces_of, with_facets
 from .facet_plan import MOST_FACETS
 from .facets import FacetSet
+from .random_surface import RANDOM_STREAMS, ROUND, Pieces, pieces_of, with_facets
 
 KERNELS = "facet_pieces.cl"
 # of edges of what a work-item cuts, over those of pieces: some hundred pieces each, of which a path has a dozen cuts

@@ -18,14 +18,12 @@ from ..scene.scene import Scene
 from ..scene.terrain import Heights, above, check_above, clear_of, facets_on
 from ..visibility.illumination import ALL_DARK, Illumination, lit
 from ..visibility.lit_parts import ON_PLANE, FacetPieces, LitParts
-from ._random_surface import Pieces
 from .facet_kinds import coherent
 from .facets import FacetSet
+from .random_surface import Pieces
 from .rough_pieces import RoughFacets, RoughPieces
 
 Progress = Callable[[int, int], object]  # called as progress(pulse, pulses)
-# pairs of piece and pulse, up to which rough facets are clipped too: about ten seconds
-FEW_LOOKS = 2e6
 # Facets count as small where their sides are less than so many times the distance below which corners lie in a plane;
 # so many of them, or such a share of all, are worth a warning
 SMALL, MANY_SMALL, FEW_SMALL = 10.0, 100, 0.01
@@ -304,12 +302,11 @@ def check_antennas_above(scene: Scene, antennas: PulseGeometry) -> None:
                 check_above(name, scene.heights, positions)
 
 
-def samples_shadows(scene: Scene, cell: float, n_pulses: int) -> bool:
-    """Whether so many pieces of incoherent facets, cut to a cell's edge, m, are seen by pulses that shadows on them are
-    counted in samples."""
+def rough_looks(scene: Scene, cell: float, n_pulses: int) -> float:
+    """Pairs of a pulse and a piece of incoherent facets, cut to a cell's edge, m."""
     rough = ~coherent(scene)
     pieces = np.maximum(2 * geometry.areas(scene.triangles[rough]) / cell**2, 1.0)
-    return float(pieces.sum()) * n_pulses > FEW_LOOKS
+    return float(pieces.sum()) * n_pulses
 
 
 def faces_away(centers: np.ndarray, normals: np.ndarray, antennas: PulseGeometry) -> np.ndarray:

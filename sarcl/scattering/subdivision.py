@@ -11,11 +11,11 @@ from ..model.waveform import Waveform
 from ..opencl.device import Device
 from ..scene.scene import Scene
 from ._facet_norm import longest_piece
-from ._random_surface import Pieces, pieces_of
-from ._random_surface import cell_edge as cell_edge
 from .antenna_weights import WeightError
 from .facet_kinds import FacetView
 from .facet_plan import CutLimits, FacetPlan, plan_facets
+from .random_surface import Pieces, pieces_of
+from .random_surface import cell_edge as cell_edge
 from .rough_pieces import RoughPieces
 
 

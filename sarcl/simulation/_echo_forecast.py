@@ -34,7 +34,6 @@ from .scene_plan import SHADOWS, parts_of, samples_shadows
 from .scene_preparation import warn_of_curves
 from .spectral.spectral_task import spectral_task
 
-SHARE, LEAST = 0.06, 0.035  # of the modelled job, and seconds: preparing the scene may take the larger of these
 TIMED_SHARE, LEAST_TIMED = 0.02, 4e-3  # of the modelled job, and seconds, of pulses that are timed
 SLOWER = 4.0  # over the modelled seconds: pulses that take longer have built kernels or waited; they are timed again
 MOST_PLANS = 64  # channels and receivers whose plans are made: of more, those of the pulses that are timed
@@ -61,7 +60,8 @@ def forecast_of(
     plan["spectral_echo"]  about the seconds of `spectral_echo` instead, or why it refuses or was not planned
     """
     work, shape = EchoWork.of(planned), planned.channels.shape
-    if work.preparing <= max(SHARE * work.seconds, LEAST):
+    limits = task.request.limits
+    if work.preparing <= max(limits.prepared_share * work.seconds, limits.prepared_seconds):
         planned, prepared = planned.with_scene()
         clock.lap("plan")
         estimate = _timed(task, planned, prepared, work)

@@ -19,6 +19,20 @@ from .scene_options import SceneOptions
 HOST_SHARE, LEAST_HOST = 0.25, 2.0**28
 
 
+@dataclass(frozen=True)
+class EchoLimits:
+    """Where plans of echoes change their way.
+
+    few_looks         pairs of piece and pulse, up to which rough facets are clipped too: about ten seconds
+    prepared_share    of the modelled job, and
+    prepared_seconds  s: a forecast may take the larger of these to prepare the scene
+    """
+
+    few_looks: float = 2e6
+    prepared_share: float = 0.06
+    prepared_seconds: float = 0.035
+
+
 @dataclass(frozen=True, eq=False)
 class EchoRequest:
     """What is asked for, of every channel alike.
@@ -39,6 +53,7 @@ class EchoRequest:
     seed: int
     progress: Progress | None
     clock: Clock = field(default_factory=Clock)
+    limits: EchoLimits = EchoLimits()
     method: str = "direct"
 
     @classmethod

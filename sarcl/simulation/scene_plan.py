@@ -17,7 +17,7 @@ from ..scattering.antenna_weight_error import weight_error as error_of_weights
 from ..scattering.antenna_weights import AntennaWeights, WeightError
 from ..scattering.facet_kinds import FacetView
 from ..scattering.facet_plan import MOST_FACETS
-from ..scattering.scatterers import samples_shadows as counts_shadows
+from ..scattering.scatterers import rough_looks
 from ..scattering.subdivision import Subdivision, cell_edge, plan_cut
 from ..scene.scene import Scene
 from ._unseen_scene import refuse_unseen
@@ -114,7 +114,8 @@ def samples_shadows(request: EchoRequest, seen: SeenScene) -> bool:
     """Whether shadows on rough facets are counted in samples."""
     cell = np.inf if request.max_edge is None else cell_edge(seen.waveform)
     n_facets = len(seen.scene.triangles)
-    return request.shadows and bool(n_facets) and counts_shadows(seen.scene, cell, len(seen.antennas))
+    few = request.limits.few_looks
+    return request.shadows and bool(n_facets) and rough_looks(seen.scene, cell, len(seen.antennas)) > few
 
 
 def plan_scene(

@@ -1,9 +1,12 @@
 """The progress bar: drawn on terminals and in notebooks only, and only for long stages."""
 
 import io
+import itertools
 import os
 import subprocess
 import sys
+import time
+from types import SimpleNamespace
 
 import pytest
 
@@ -18,10 +21,10 @@ class Terminal(io.StringIO):
 
 @pytest.fixture
 def terminal(monkeypatch):
-    """A terminal that can erase a line; stages are drawn from their first step."""
+    """A terminal that can erase a line, and a clock by which stages are drawn from their first step."""
     stream = Terminal()
     monkeypatch.setenv("TERM", "xterm")
-    monkeypatch.setattr(progress, "DELAY", 0.0)
+    monkeypatch.setattr(progress, "time", SimpleNamespace(monotonic=itertools.count(0, 2.0).__next__))
     return stream
 
 
@@ -36,7 +39,7 @@ def screen(text):
 
 
 def test_a_stage_shorter_than_a_second_draws_nothing(terminal, monkeypatch):
-    monkeypatch.setattr(progress, "DELAY", 1.0)
+    monkeypatch.setattr(progress, "time", time)
     work(Bar(terminal))
     assert terminal.getvalue() == ""
 

@@ -13,7 +13,7 @@ import report as page
 
 import sarcl
 from sarcl.bench import _baseline as numpy_baseline
-from sarcl.bench import _cases, _exact, _measure, _peers, _wait_idle, pareto, ratios, tables
+from sarcl.bench import _cases, _measure, _peers, _wait_idle, exact, pareto, ratios, tables
 from sarcl.bench import backproject as bench
 from sarcl.bench._competitor import Absent, Competitor, Reading
 from sarcl.cli import parser
@@ -26,7 +26,7 @@ import json, sys
 import numpy as np
 from pathlib import Path
 from sarcl.bench import backproject as bench
-from sarcl.bench import _cases, _exact
+from sarcl.bench import _cases, exact
 folder = None
 def answer(content):
     print(json.dumps(content), flush=True)
@@ -47,7 +47,7 @@ for line in sys.stdin:
         continue
     raw, grid = _cases.load(folder)
     at = json.loads((folder / "case.json").read_text())["at"]
-    values = _exact.backproject(raw, grid.at(*np.array(at)))[0] * 1.01
+    values = exact.backproject(raw, grid.at(*np.array(at)))[0] * 1.01
     answer({"seconds": {"setup": 0.25, "form": 0.5, "cpu": 0.9}, "values": [[v.real, v.imag] for v in values]})
 """
 
@@ -77,7 +77,7 @@ def test_the_quick_exact_sum_is_the_reference(n_samples):
         reference_range=np.linalg.norm(tx, axis=1) + random.standard_normal(5),
     )
     points = random.uniform(-45, 45, (20, 3))  # some beyond the range window of 37 m
-    got, norm = _exact.backproject(raw, points)
+    got, norm = exact.backproject(raw, points)
     wanted, spread = reference(raw, points)
     assert np.linalg.norm(got - wanted) < 1e-11 * np.linalg.norm(wanted)
     assert norm == pytest.approx(spread, rel=1e-11)

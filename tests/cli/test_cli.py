@@ -16,7 +16,7 @@ from helpers.cases import SCENARIO
 
 import sarcl
 from sarcl.cli import parser
-from sarcl.cli._commands import device_table
+from sarcl.opencl import choose_device, device_list
 
 GRID = """
 [grid.plane]
@@ -130,11 +130,16 @@ def record(**changes):
     return SimpleNamespace(**{**common, "vector_width": 8, "memory": 6e9, "max_alloc": 2e9, **changes})
 
 
-def test_devices_marks_the_one_in_use_and_says_why_others_do_not_work():
+def test_devices_marks_the_one_in_use_and_says_why_others_do_not_work(monkeypatch, capsys):
     broken = record(index=1, name="gpu-y", kind="gpu", works=False, fp64=False, why="unknown target CPU")
-    lines = device_table([record(), broken], picked=[0]).splitlines()
+    single = record(index=2, fp64=False, why="wrong numbers: float64 is float32")
+    monkeypatch.setattr(device_list, "tried_again", lambda: [record(), broken, single])
+    monkeypatch.setattr(choose_device, "open_devices", lambda choice: [SimpleNamespace(info=record())])
+    assert parser.main(["devices"]) == 0
+    lines = capsys.readouterr().out.splitlines()
     assert lines[1].startswith("*  0  cpu-x") and "6 GB" in lines[1] and "2 GB" in lines[1]
     assert lines[2].startswith("   1  gpu-y") and lines[3].strip() == "does not work: unknown target CPU"
+    assert lines[4].startswith("   2  cpu-x") and lines[5].strip().startswith("float64 does not work: wrong numbers")
 
 
 def test_devices_lists_what_is_here():

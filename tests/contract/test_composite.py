@@ -37,7 +37,7 @@ def composite(half):
     return ground + body + mast + points
 
 
-def track(n=48):
+def track(n=24):
     azimuth = 0.04 * (np.arange(n) / n - 0.5)
     around = [np.cos(azimuth), np.sin(azimuth), np.full(n, 0.7)]
     return sarcl.Trajectory(np.arange(n) / 100.0, 1e5 * np.stack(around, axis=1))

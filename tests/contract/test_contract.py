@@ -10,7 +10,7 @@ from helpers.cases import image_error, noise_on
 from helpers.contract_cases import build, draw
 
 import sarcl
-from sarcl.bench._exact import backproject as quick_sum
+from sarcl.bench.exact import backproject as quick_sum
 from sarcl.imaging.direct import direct, line_plan
 from sarcl.numerics import interpolation, interpolator_choice
 from sarcl.opencl.choose_device import open_device

@@ -11,11 +11,7 @@ from helpers.cases import image_error, noise_on, straight
 import sarcl
 from sarcl.base.tolerances import reachable
 from sarcl.imaging import choose_method
-from sarcl.imaging.range_doppler._aperture_window import ApertureWindow
-from sarcl.numerics import windows
 from sarcl.reference.polar_format import polar_format as plane_waves
-from sarcl.simulation.spectral import _azimuth_transfer
-from sarcl.simulation.spectral._planning_time import PlanningTime
 
 GRID = sarcl.ImageGrid.plane(shape=(5, 4), spacing=0.4)
 
@@ -228,15 +224,6 @@ def test_a_receiver_that_its_polynomial_continues_faster_than_light_is_refused()
     assert found.flight[0, 0] == pytest.approx(3e5 * (1 / (1 - 0.4) - 1), rel=1e-4)  # times of 2e9 s have 2e-7 s
 
 
-def test_a_window_beside_the_direction_of_flight_counts_no_rows_beyond_it():
-    """The window's smooth end reaches sines above 1, under which no row sees anything: the share of rows was NaN."""
-    made = ApertureWindow.over(0.9, 1.0, windows.table("hamming"), 0.002, 3e-2)
-    assert made.sines[-1] > 1
-    rows = made.weights[made.sines < 1] / (1 - made.sines[made.sines < 1] ** 2) ** 1.5
-    beyond = made.sines[made.sines < 1] < 0.9
-    assert made.outside(0.9, 1.0) == pytest.approx(rows[beyond].sum() / rows.sum(), rel=1e-12)
-
-
 def test_a_tolerance_that_cannot_be_asked_for_is_not_named_as_the_best():
     """The beam looks aside, 400 dB below its peak: 1e14 was named as the best tolerance, which nobody may ask for."""
     raw = noise_on(straight(6, distance=700.0), n_samples=24)
@@ -323,38 +310,3 @@ def test_errors_that_add_up_in_phase_over_few_rows_are_planned_for(tolerance, de
         raw_here = replace(raw, samples=raw.samples + common)
         image = sarcl.backproject(raw_here, grid, tolerance=tolerance, method="direct", check=False, device=device)
         assert image_error(image, raw_here) <= image.report.predicted_error <= tolerance, away
-
-
-def few_pulses_far_away():
-    """7 pulses 0.1 mm apart and 1000 km from three points: half a kilometre of track is a Fresnel zone at 0.6 GHz."""
-    track = sarcl.Trajectory.line(start=(-7e5, 0, 7e5), velocity=(0, 1, 0), prf=1e4, n_pulses=7)
-    points = sarcl.Scene.points([[0, 0, 0], [30, 20, 0], [-40, 10, 0.0]])
-    return points, sarcl.Waveform.chirp(center=6e8, bandwidth=1e7, duration=1e-5), track
-
-
-def test_a_plan_of_spectral_echo_that_takes_longer_than_echo_is_refused(monkeypatch):
-    """It compared responses over millions of pulse intervals, for minutes, of which the track has seven."""
-    for name in ("response_error", "transfer_tables"):
-        monkeypatch.setattr(_azimuth_transfer, name, lambda *given: pytest.fail("responses were transformed"))
-    says = r"seen over \d{6,} pulse intervals, of which the track has 7; .* echo takes about .* in all: use echo"
-    forecast = sarcl.plan(sarcl.echo, *few_pulses_far_away())
-    assert forecast.plan["spectral_echo"].startswith("not planned: that takes long beside echo")
-    for variant in ("exact", "saras"):
-        with pytest.raises(ValueError, match=says):
-            sarcl.spectral_echo(*few_pulses_far_away(), variant=variant)
-
-
-def test_the_time_of_a_plan_is_that_of_all_its_steps():
-    with pytest.raises(ValueError, match=r"more than 1\.2 s"):
-        PlanningTime(7, 0.0, longest=1.0).spend(1e7, 5000)
-    limit = PlanningTime(7, 0.0)
-    limit.spend(3e7, 5000)  # 3.6 s
-    with pytest.raises(ValueError, match=r"more than 7\.2 s, and echo takes about 0 s"):
-        limit.spend(3e7, 5000)
-    many = PlanningTime.of_echo(100_000, 10_000, 1000, 2, False)  # 280 us for each pulse and polarisation: 56 s
-    many.spend(4.6e8, 110_000)
-    with pytest.raises(ValueError, match="more than 57 s, and echo takes about 56 s"):
-        many.spend(1.5e7, 110_000)
-    facets = PlanningTime.of_echo(100_000, 10_000, 1000, 1, True)
-    with pytest.raises(ValueError, match="echo takes about 3 min"):
-        facets.spend(2e9, 110_000)

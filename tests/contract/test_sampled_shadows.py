@@ -7,9 +7,9 @@ import pickle
 import numpy as np
 import pytest
 import trimesh
+from helpers.cases import planned_within, thinned
 
 import sarcl
-from sarcl.scattering import scatterers
 
 pytestmark = pytest.mark.filterwarnings("ignore:too few facets for speckle:sarcl.SarclWarning")
 
@@ -61,33 +61,30 @@ TRACKS = {
 }
 
 
-def echo(scene, track, monkeypatch, few, tolerance, **options):
-    monkeypatch.setattr(scatterers, "FEW_LOOKS", few)
+def echo(scene, track, few, tolerance, **options):
     tx, receiver = track
     window = {"range_window": (-15, 15), "reference": scene.center}
-    return sarcl.echo(scene, CHIRP, tx, receiver=receiver, tolerance=tolerance, seed=3, **window, **options)
+    options |= {"receiver": receiver, "tolerance": tolerance, "seed": 3, **window}
+    return planned_within({"few_looks": few}, sarcl.echo, scene, CHIRP, tx, **options).run()
 
 
-@pytest.mark.parametrize("track", TRACKS)
-@pytest.mark.parametrize("name", SCENES)
-def test_sampled_shadows_meet_the_tolerance(name, track, monkeypatch):
+@pytest.mark.parametrize("name, track", thinned(SCENES, TRACKS))
+def test_sampled_shadows_meet_the_tolerance(name, track):
     scene = SCENES[name]()
-    wanted = echo(scene, TRACKS[track], monkeypatch, np.inf, 3e-4)
+    wanted = echo(scene, TRACKS[track], np.inf, 3e-4)
     assert "shadow edges" not in wanted.report.plan
     for tolerance in (1e-1, 1e-2):
-        raw = echo(scene, TRACKS[track], monkeypatch, 0, tolerance)
+        raw = echo(scene, TRACKS[track], 0, tolerance)
         assert raw.report.plan["shadow edges"].startswith("sampled, ")
         error = np.linalg.norm(raw.samples - wanted.samples) / np.linalg.norm(wanted.samples)
         assert 0 < error <= raw.report.predicted_error <= tolerance
 
 
 @pytest.mark.parametrize("name", ["hills", "gentle hills"])
-def test_facets_edge_on_to_one_of_two_antennas_and_slivers_that_both_see(name, monkeypatch):
+def test_facets_edge_on_to_one_of_two_antennas_and_slivers_that_both_see(name):
     """Some hills turn edge-on to the transmitter; ground under the house is lit in strips by both antennas."""
     scene = SCENES[name]()
-    wanted, raw = (
-        echo(scene, TRACKS["bistatic"], monkeypatch, few, tolerance) for few, tolerance in ((np.inf, 1e-4), (0, 1e-3))
-    )
+    wanted, raw = (echo(scene, TRACKS["bistatic"], few, tolerance) for few, tolerance in ((np.inf, 1e-4), (0, 1e-3)))
     error = np.linalg.norm(raw.samples - wanted.samples, axis=1) / np.linalg.norm(wanted.samples, axis=1)
     assert error.max() <= 0.9e-3  # at every pulse
 
@@ -102,15 +99,15 @@ def plate_behind(screen, n, length):
     return plate + screen, (sarcl.Trajectory.line(start=start, velocity=(0, speed, 0), prf=100, n_pulses=n), None)
 
 
-@pytest.mark.parametrize("n", [9, 33, 129])
 @pytest.mark.parametrize(
-    ("screen", "length"), [((-0.7, 0.7, 0, 12), 4e3), ((0.55, 1.05, 0, 12), 2e4), ((-3.6, -0.2, -0.1, 9), 6e3)]
+    "screen, length, n",
+    thinned([((-0.7, 0.7, 0, 12), 4e3), ((0.55, 1.05, 0, 12), 2e4), ((-3.6, -0.2, -0.1, 9), 6e3)], [9, 33, 129]),
 )
-def test_one_facet_and_one_screen(screen, length, n, monkeypatch):
+def test_one_facet_and_one_screen(screen, length, n):
     """Wholly dark half-way; dark between looks far apart; partly lit there alone: errors of up to a half before."""
     scene, track = plate_behind(screen, n, length)
-    wanted = echo(scene, track, monkeypatch, np.inf, 1e-3)
-    raw = echo(scene, track, monkeypatch, 0, 1e-2)
+    wanted = echo(scene, track, np.inf, 1e-3)
+    raw = echo(scene, track, 0, 1e-2)
     error = np.linalg.norm(raw.samples - wanted.samples) / np.linalg.norm(wanted.samples)
     assert error <= raw.report.predicted_error + 1e-3
 
@@ -122,58 +119,57 @@ def terms_of(report):
     return terms
 
 
-def test_terms_of_the_error_name_shadows(monkeypatch, tmp_path):
+def test_terms_of_the_error_name_shadows(tmp_path):
     scene = SCENES["house"]() + sarcl.Scene.points([[0, 0, 9.0]], [1e-6])
-    raw = echo(scene, TRACKS["arc"], monkeypatch, 0, 1e-2)
+    raw = echo(scene, TRACKS["arc"], 0, 1e-2)
     terms = terms_of(raw.report)
     assert set(terms) == {"points", "facets", "shadow edges", "motion of shadows"}
     assert f"shadow edges {terms['shadow edges']:.1e}, motion of shadows" in str(raw.report)
     raw.save(tmp_path / "raw.h5")
     assert sarcl.read(tmp_path / "raw.h5").report.error_terms == raw.report.error_terms
     assert pickle.loads(pickle.dumps(raw.report)).error_terms == raw.report.error_terms
-    assert set(terms_of(echo(scene, TRACKS["arc"], monkeypatch, np.inf, 1e-2).report)) == {"points", "facets"}
-    monkeypatch.setattr(scatterers, "FEW_LOOKS", 0)
+    assert set(terms_of(echo(scene, TRACKS["arc"], np.inf, 1e-2).report)) == {"points", "facets"}
     pulse_by_pulse = {"facets added pulse by pulse", "shadow edges", "motion of shadows"}
     assert pulse_by_pulse < set(terms_of(spectral(SCENES["house"](), 1e-2).report))
     assert not sarcl.Report().error_terms
 
 
 @pytest.mark.parametrize("few", [0, np.inf])
-def test_progress_tells_which_pulses_are_done(few, monkeypatch):
+def test_progress_tells_which_pulses_are_done(few):
     said = []
-    echo(SCENES["house"](), TRACKS["wide"], monkeypatch, few, 1e-1, progress=lambda *a: said.append(a))
+    echo(SCENES["house"](), TRACKS["wide"], few, 1e-1, progress=lambda *a: said.append(a))
     shadows = [done for stage, done, total in said if stage == "shadows" and total == PULSES]
     assert len(shadows) > 1 and shadows == sorted(shadows) and shadows[-1] == PULSES
     stages = [stage for stage, *_ in said]
     assert stages.index("shadows") > stages.index("scene") and said[-1][0] == "echo"
 
 
-def test_more_lines_of_samples_and_pulses_are_taken_for_a_smaller_tolerance(monkeypatch):
+def test_more_lines_of_samples_and_pulses_are_taken_for_a_smaller_tolerance():
     scene, track = SCENES["house"](), TRACKS["arc"]
-    wanted, raw = (echo(scene, track, monkeypatch, few, 1e-3) for few in (np.inf, 0))
+    wanted, raw = (echo(scene, track, few, 1e-3) for few in (np.inf, 0))
     error = np.linalg.norm(raw.samples - wanted.samples) / np.linalg.norm(wanted.samples)
     assert error <= 1.7e-3  # those of both
 
 
-def test_a_tolerance_that_samples_cannot_meet_is_refused_with_the_best(monkeypatch):
+def test_a_tolerance_that_samples_cannot_meet_is_refused_with_the_best():
     scene, track = SCENES["hills"](), TRACKS["bistatic"]
     with pytest.raises(sarcl.ToleranceUnreachable, match="shadow edges on rough facets") as refused:
-        echo(scene, track, monkeypatch, 0, 3e-5, max_edge=1.0)
+        echo(scene, track, 0, 3e-5, max_edge=1.0)
     best = refused.value.best
     assert best == float(f"{best:.1e}")  # two digits: it can be typed as it is printed
-    assert echo(scene, track, monkeypatch, 0, best, max_edge=1.0).report.predicted_error <= best
+    assert echo(scene, track, 0, best, max_edge=1.0).report.predicted_error <= best
 
 
-def test_little_memory_for_shares_changes_nothing(monkeypatch):
+def test_little_memory_for_shares_changes_nothing():
     scene, track = SCENES["house"](), TRACKS["wide"]
-    much, little = (echo(scene, track, monkeypatch, 0, 1e-2, max_bytes=size) for size in (1e9, 2e7))
+    much, little = (echo(scene, track, 0, 1e-2, max_bytes=size) for size in (1e9, 2e7))
     assert np.linalg.norm(much.samples - little.samples) <= 1e-6 * np.linalg.norm(much.samples)
 
 
-def test_levels_change_from_pulse_to_pulse_between_viewpoints(monkeypatch):
+def test_levels_change_from_pulse_to_pulse_between_viewpoints():
     """The check adds the levels of each pulse: they are not the steps of viewpoints, of which there are fewer."""
     scene, track = SCENES["house"](), sarcl.Trajectory.circle(radius=7e3, height=5e3, start=0.3, arc=0.03, n_pulses=200)
-    report = echo(scene, (track, None), monkeypatch, 0, 1e-2, check=True).report
+    report = echo(scene, (track, None), 0, 1e-2, check=True).report
     assert 0 < report.measured_error < 0.3 * report.predicted_error
 
 
@@ -182,14 +178,14 @@ LINE = sarcl.Trajectory.line(start=(6e3, -30, 5e3), velocity=(0, 100, 0), prf=10
 
 def spectral(scene, tolerance, **options):
     window = {"range_window": (-15, 15), "reference": scene.center}
-    return sarcl.spectral_echo(scene, CHIRP, LINE, tolerance=tolerance, seed=3, **window, **options)
+    options |= {"tolerance": tolerance, "seed": 3, **window}
+    return planned_within({"few_looks": 0}, sarcl.spectral_echo, scene, CHIRP, LINE, **options).run()
 
 
-@pytest.mark.parametrize("name", SCENES)
-def test_spectral_echoes_with_sampled_shadows_meet_the_tolerance(name, monkeypatch):
+@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow if "gentle" in n else ()) for n in SCENES])
+def test_spectral_echoes_with_sampled_shadows_meet_the_tolerance(name):
     scene = SCENES[name]()
-    wanted = echo(scene, (LINE, None), monkeypatch, np.inf, 3e-4)
-    monkeypatch.setattr(scatterers, "FEW_LOOKS", 0)
+    wanted = echo(scene, (LINE, None), np.inf, 3e-4)
     for tolerance in (1e-1, 1e-2):
         raw = spectral(scene, tolerance)
         assert raw.report.plan["shadow edges"].startswith("sampled, ")
@@ -197,7 +193,6 @@ def test_spectral_echoes_with_sampled_shadows_meet_the_tolerance(name, monkeypat
         assert 0 < error <= raw.report.predicted_error <= tolerance
 
 
-def test_the_variant_saras_says_that_sampled_shadows_are_not_part_of_the_error(monkeypatch):
-    monkeypatch.setattr(scatterers, "FEW_LOOKS", 0)
+def test_the_variant_saras_says_that_sampled_shadows_are_not_part_of_the_error():
     raw = spectral(SCENES["house"](), 0.3, variant="saras")
     assert raw.report.plan["shadow edges"] == "sampled, not part of the error"

@@ -9,8 +9,8 @@ import pytest
 from helpers.cases import image_error, noise_history, noise_on, straight
 
 import sarcl
-from sarcl.bench._exact import backproject as quick_sum
-from sarcl.imaging.factorized import _tile_coverage, factorized
+from sarcl.bench.exact import backproject as quick_sum
+from sarcl.imaging.factorized import factorized
 from sarcl.reference.backproject import backproject as exact
 
 C = 299792458.0
@@ -19,8 +19,8 @@ SLOW = pytest.mark.slow
 
 @pytest.fixture
 def sights(monkeypatch):
-    """The coverage of the largest tiles by rows in factorised runs (_tile_coverage.py)."""
-    seen, coverage_of = [], _tile_coverage.coverage_of
+    """The coverage of the largest tiles by rows in factorised runs."""
+    seen, coverage_of = [], factorized.coverage_of
     monkeypatch.setattr(factorized, "coverage_of", lambda *a: seen.append(coverage_of(*a)) or seen[-1])
     return seen
 

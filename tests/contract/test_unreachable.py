@@ -7,7 +7,6 @@ import copy
 import functools
 import pickle
 import re
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -314,7 +313,7 @@ def test_what_progress_raises_comes_out_of_interpolated_channels():
 def test_interpolated_channels_that_cannot_keep_the_tolerance_give_way_before_any_work(monkeypatch):
     assert "array positions" in interpolated().report.plan
     from sarcl.simulation import scene_plan
-    from sarcl.simulation.channels._interpolated import InterpolatedChannels
+    from sarcl.simulation.channels.array_channels import InterpolatedChannels
 
     plan = scene_plan.plan_scene
 
@@ -326,22 +325,6 @@ def test_interpolated_channels_that_cannot_keep_the_tolerance_give_way_before_an
     monkeypatch.setattr(scene_plan, "plan_scene", tight)
     monkeypatch.setattr(InterpolatedChannels, "fill", broken)
     assert "array positions" not in interpolated().report.plan
-
-
-def test_a_forecast_times_other_pulses_only_where_nothing_is_seen(monkeypatch):
-    from sarcl.simulation._single_channel import SingleEchoes
-
-    tried, fill = [], SingleEchoes.fill
-
-    def unseen(method, scene, samples, start, done, total):
-        tried.append(start)
-        added = fill(method, scene, samples, start, done, total)
-        return replace(added, counts=replace(added.counts, outside_window=added.counts.pairs))
-
-    sarcl.plan(sarcl.echo, POINTS, CHIRP, track(60))
-    monkeypatch.setattr(SingleEchoes, "fill", unseen)
-    assert sarcl.plan(sarcl.echo, POINTS, CHIRP, track(60)).plan["contributions"] == 0
-    assert len(set(tried)) == 3
 
 
 # Files that may catch ValueError, or everything, and why: each gives the error of a foreign library a message.

@@ -9,7 +9,8 @@ import pytest
 from helpers.cases import image_error, noise_on, straight, thinned
 
 import sarcl
-from sarcl.imaging.direct import _line_curvature, line_plan
+from sarcl.base.rows import spread_over
+from sarcl.imaging.direct import line_plan
 
 
 def holds(raw, grid, tolerance, **options):
@@ -55,7 +56,8 @@ def test_pulses_that_see_the_grid_more_grazing_than_the_sampled_ones(tolerance):
     n = 1600
     sampled = np.zeros(n, bool)
     for group in line_plan.GROUP_SIZES:
-        for start in _line_curvature.sampled_groups(n, group):
+        starts = np.arange(0, n - group + 1, group)
+        for start in starts[spread_over(len(starts), 24)]:
             sampled[start : start + group + 1] = True
     assert sampled.sum() < n / 2
     angle = np.where(sampled, 0.3, 1.4)

@@ -9,10 +9,10 @@ import pytest
 from helpers.fdtd_cases import conductor_on_grid
 
 from sarcl.fullwave import runs
-from sarcl.fullwave._currents import currents
-from sarcl.fullwave._formed_echoes import formed_echoes
-from sarcl.fullwave._incident import PlaneWave
 from sarcl.fullwave.anchors import anchored
+from sarcl.fullwave.currents import currents
+from sarcl.fullwave.formed_echoes import formed_echoes
+from sarcl.fullwave.incident import PlaneWave
 from sarcl.opencl.choose_device import open_device
 from sarcl.scattering.physical_optics import polarisation
 

@@ -7,12 +7,12 @@ import pytest
 from helpers.devices import opened, variants
 
 from sarcl.base.constants import SPEED_OF_LIGHT
-from sarcl.fullwave import _dispersion
-from sarcl.fullwave._currents import currents
-from sarcl.fullwave._incident import PlaneWave, wave_table
-from sarcl.fullwave._pulse import Pulse
+from sarcl.fullwave import dispersion
+from sarcl.fullwave.currents import currents
 from sarcl.fullwave.fields import BLOCK, Fields
+from sarcl.fullwave.incident import PlaneWave, wave_table
 from sarcl.fullwave.lattice import COURANT, Lattice, lattice_around
+from sarcl.fullwave.pulse import Pulse
 from sarcl.fullwave.target import Target, material_edges
 from sarcl.reference import equations
 
@@ -29,9 +29,9 @@ def unit(vector):
 def test_a_plane_wave_of_the_grid_solves_its_update_equations(direction, cells):
     grid, d = Lattice(CELL, (5, 6, 16), np.zeros(3)), unit(direction)
     k = np.array([2 * np.pi / (cells * CELL)])
-    omega = _dispersion.grid_omega(grid, k, d)
-    assert np.allclose(_dispersion.wavenumber(grid, omega, d), k, rtol=1e-12)
-    units = _dispersion.fields(_dispersion.grid_vector(grid, k, d), np.array([0.3, 1.0, -0.2]))
+    omega = dispersion.grid_omega(grid, k, d)
+    assert np.allclose(dispersion.wavenumber(grid, omega, d), k, rtol=1e-12)
+    units = dispersion.fields(dispersion.grid_vector(grid, k, d), np.array([0.3, 1.0, -0.2]))
     places = np.arange(3 * np.prod(grid.shape))
 
     def wave(magnetic, steps):
@@ -49,19 +49,19 @@ def test_a_plane_wave_of_the_grid_solves_its_update_equations(direction, cells):
 def test_dispersion_at_ten_cells_along_an_axis_is_the_closed_form():
     """sin(omega dt/2) = s sin(k dx/2): 1.55 % slow at c dt/dx = 0.289."""
     grid, k = Lattice(CELL, (1, 1, 16), np.zeros(3)), 2 * np.pi / (10 * CELL)
-    omega = _dispersion.grid_omega(grid, np.array([k]), unit((1, 0, 0)))[0]
+    omega = dispersion.grid_omega(grid, np.array([k]), unit((1, 0, 0)))[0]
     assert np.isclose(np.sin(omega * grid.time_step / 2), COURANT * np.sin(k * CELL / 2), rtol=1e-13)
-    own = _dispersion.wavenumber(grid, np.array([k * SPEED_OF_LIGHT]), unit((1, 0, 0)))[0]
+    own = dispersion.wavenumber(grid, np.array([k * SPEED_OF_LIGHT]), unit((1, 0, 0)))[0]
     assert 0.0154 < own / k - 1 < 0.0160
-    assert np.isclose(_dispersion.flux(grid, np.array([k]), unit((1, 0, 0)))[0], np.cos(k * CELL / 2), rtol=1e-13)
+    assert np.isclose(dispersion.flux(grid, np.array([k]), unit((1, 0, 0)))[0], np.cos(k * CELL / 2), rtol=1e-13)
 
 
 def test_waves_that_the_grid_does_not_carry_are_refused():
     grid = Lattice(CELL, (1, 1, 16), np.zeros(3))
     with pytest.raises(ValueError, match=r"below two cells of 0\.01 m; use smaller cells"):
-        _dispersion.grid_omega(grid, np.array([2 * np.pi / (1.9 * CELL)]), unit((1, 0, 0)))
+        dispersion.grid_omega(grid, np.array([2 * np.pi / (1.9 * CELL)]), unit((1, 0, 0)))
     with pytest.raises(ValueError, match=r"above what cells of 0\.01 m carry; use smaller cells"):
-        _dispersion.wavenumber(grid, np.array([2 * np.pi * SPEED_OF_LIGHT / (1.9 * CELL)]), unit((1, 0, 0)))
+        dispersion.wavenumber(grid, np.array([2 * np.pi * SPEED_OF_LIGHT / (1.9 * CELL)]), unit((1, 0, 0)))
     with pytest.raises(ValueError, match="lies along travel"):
         PlaneWave(np.array([0, 0, 2.0]), np.array([0, 0, 1.0]), Pulse.gaussian(1e9, 2e9))
     with pytest.raises(ValueError, match="give a multiple of 16, such as 32"):
@@ -157,10 +157,8 @@ def test_inside_the_box_stands_the_wave_that_was_asked_for(param):
     )
     for field, magnetic, steps in ((e, 0, fields.step), (h, 1, fields.step - 0.5)):
         path = (grid.positions(at, magnetic) - centre) @ table.wave.travel
-        k = _dispersion.wavenumber(grid, table.omega, table.wave.travel)
-        units = _dispersion.fields(_dispersion.grid_vector(grid, k, table.wave.travel), table.wave.polarization)[
-            magnetic
-        ]
+        k = dispersion.wavenumber(grid, table.omega, table.wave.travel)
+        units = dispersion.fields(dispersion.grid_vector(grid, k, table.wave.travel), table.wave.polarization)[magnetic]
         turns = np.exp(1j * ((steps * grid.time_step - table.delay) * table.omega - np.outer(path, k)))
         wanted = (turns * table.amplitudes * units[:, at // e[0].size].T).real.sum(axis=1)
         assert np.abs(wanted).max() > 0.3

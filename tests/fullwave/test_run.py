@@ -14,15 +14,13 @@ from helpers.fdtd_cases import random_target, sphere_intervals
 
 from sarcl import shapes
 from sarcl.base.constants import SPEED_OF_LIGHT
-from sarcl.fullwave import _currents
-from sarcl.fullwave._currents import Decay, currents, sample_period
-from sarcl.fullwave._incident import PlaneWave, wave_table
-from sarcl.fullwave._lists import SAMPLES
-from sarcl.fullwave._pulse import Pulse
-from sarcl.fullwave.bodies._cut_cells import conductor
-from sarcl.fullwave.bodies._mesh_lines import mesh_lines
-from sarcl.fullwave.fields import BLOCK, Fields
+from sarcl.fullwave.bodies.cut_cells import conductor
+from sarcl.fullwave.bodies.mesh_lines import mesh_lines
+from sarcl.fullwave.currents import Decay, box_of, currents, sample_period
+from sarcl.fullwave.fields import BLOCK, SAMPLES, Fields
+from sarcl.fullwave.incident import PlaneWave, wave_table
 from sarcl.fullwave.lattice import Lattice
+from sarcl.fullwave.pulse import Pulse
 from sarcl.fullwave.runs import run_bytes
 from sarcl.fullwave.target import Target, material_edges, resting_rows
 
@@ -78,7 +76,7 @@ def test_samples_are_as_far_apart_as_the_highest_frequency_of_the_pulse_allows(c
 def test_sums_over_every_eighth_step_are_those_over_every_step(param):
     """Residuals of one run, summed in float64: only the frequencies that fall on each other can make a difference."""
     grid, wave = grid_of(32), wave_along()
-    low, high, centre = _currents.box_of(grid, ABSORBER, GAP)
+    low, high, centre = box_of(grid, ABSORBER, GAP)
     fields = Fields(
         opened(param), grid, ball(grid, 4), absorber=ABSORBER, wave=wave_table(grid, wave, low, high, centre)
     )
@@ -162,7 +160,7 @@ def test_cells_at_rest_are_left_as_they_are(param):
 @pytest.mark.parametrize("travel", [(0.5, -0.3, -0.8), (0, 0, 1), (-1, 0, 0), (0.6, 0.8, 0)])
 def test_fields_ahead_of_the_wave_are_below_rounding(param, travel):
     grid, wave = grid_of(48), wave_along(travel)
-    low, high, centre = _currents.box_of(grid, ABSORBER, GAP)
+    low, high, centre = box_of(grid, ABSORBER, GAP)
     table = wave_table(grid, wave, low, high, centre)
     target = ball(grid, 8)
     dark, full = (Fields(opened(param), grid, target, absorber=ABSORBER, wave=table, tile=t) for t in (None, 5))

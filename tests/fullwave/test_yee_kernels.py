@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from helpers.fdtd_cases import Twin, random_target
 
-from sarcl.fullwave._incident import PlaneWave, wave_table
-from sarcl.fullwave._pulse import Pulse
 from sarcl.fullwave.fields import BLOCK, Fields, tiles
+from sarcl.fullwave.incident import PlaneWave, wave_table
 from sarcl.fullwave.lattice import Lattice
+from sarcl.fullwave.pulse import Pulse
 from sarcl.fullwave.target import Target
 from sarcl.reference import fdtd
 

@@ -21,10 +21,10 @@ import numpy as np
 
 from sarcl import ToleranceMissed, ToleranceUnreachable
 from sarcl.opencl import choose_device, fft
-from sarcl.opencl._programs import names_in, source
-from sarcl.opencl.device import Device
+from sarcl.opencl.device import Device, Limits
 from sarcl.opencl.device_list import DeviceInfo
-from sarcl.opencl.launch_numbers import _layout
+from sarcl.opencl.launch_numbers import struct_layout
+from sarcl.opencl.programs import names_in, source
 from sarcl.visibility import lit_parts
 
 KERNEL = re.compile(r"__kernel\s+(?:__attribute__\(\(.*?\)\)\s+)?void\s+(\w+)\s*\(")
@@ -75,7 +75,7 @@ class Use:
 def numbers_of(file: str, text: str, kernel: str) -> np.dtype | None:
     """The type of the struct that a kernel takes its numbers in; None for a kernel that takes each by its place."""
     found = re.search(rf"void\s+{kernel}\s*\(\s*(\w+_numbers) given\b", text)
-    return found and _layout(file, found[1])
+    return found and struct_layout(file, found[1])
 
 
 def kernels_in(text: str) -> list[str]:
@@ -90,7 +90,7 @@ class PaperDevice(Device):
     """
 
     def __init__(self, info: DeviceInfo, found: dict[Variant, Use]) -> None:
-        self.info, self.found, self.task, self.until = info, found, "", ""
+        self.info, self.limits, self.found, self.task, self.until = info, Limits(), found, "", ""
         self._raw = self.context = self.queue = None
         self._kernels: dict[tuple[Any, ...], dict[str, Any]] = {}
         self._lock = threading.RLock()

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from gpu_static.collect import Variant
 
-from sarcl.opencl._programs import source
+from sarcl.opencl.programs import source
 
 CLANG = "clang-19"
 LIBRARY = Path("/usr/lib/clc")  # of Debian's package libclc-19: OpenCL's built-in functions as LLVM bitcode

@@ -16,7 +16,7 @@ import platformdirs
 from gpu_static import compilers, hot_loops, sass, tasks
 from gpu_static.collect import PAPER, WITHOUT_FP64, Use, Variant, collected
 
-from sarcl.opencl._programs import source
+from sarcl.opencl.programs import source
 
 ROOT = Path(__file__).resolve().parents[2]
 PARTS = 3  # of the tasks of a GPU, each collected by a process

@@ -27,14 +27,14 @@ from helpers.current_cases import twin as current_twin
 from helpers.fdtd_cases import Twin, random_target
 
 import sarcl
-from sarcl.fullwave import _current_sums
-from sarcl.fullwave._formed_echoes import paths_of
-from sarcl.fullwave._incident import PlaneWave, wave_table
-from sarcl.fullwave._pulse import Pulse
+from sarcl.fullwave.current_sums import current_sums
 from sarcl.fullwave.fields import BLOCK, Fields
+from sarcl.fullwave.formed_echoes import paths_of
+from sarcl.fullwave.incident import PlaneWave, wave_table
 from sarcl.fullwave.lattice import Lattice
+from sarcl.fullwave.pulse import Pulse
 from sarcl.numerics import cost_model
-from sarcl.opencl import _programs, choose_device, fft
+from sarcl.opencl import choose_device, fft, programs
 from sarcl.opencl import device as device_module
 from sarcl.opencl.choose_device import open_device
 from sarcl.opencl.device import Device
@@ -168,7 +168,7 @@ def currents() -> Errors:
     given = random_currents(70, 9)
     tx, rx = antennas(given, 5, 0.2), antennas(given, 5, 0.5, seed=2)
     paths = paths_of(given, tx, rx)
-    made = _current_sums.current_sums(open_device(), given, paths, max_bytes=None)
+    made = current_sums(open_device(), given, paths, max_bytes=None)
     return difference(made, current_twin(given, paths, tx, rx)), 5e-5
 
 
@@ -235,7 +235,7 @@ def main() -> int:
     for make in ("upload", "empty"):
         setattr(Device, make, _keeping(getattr(Device, make)))
     fft._reikna, fft.in_place = _reikna, _in_place
-    whole = _programs.source
+    whole = programs.source
     device_module.source = lambda file: whole(file).replace("restrict", "")  # type: ignore[assignment]
     device = open_device()
     assert "Oclgrind" in device.info.name, f"this is {device.info.name}, not Oclgrind"

@@ -22,7 +22,7 @@ sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "bench")]
 from gpu_static import compilers, figures, hot_loops, page, ratchet, sass  # noqa: E402
 from gpu_static.collect import Variant, kernels_in  # noqa: E402
 
-from sarcl.opencl._programs import source  # noqa: E402
+from sarcl.opencl.programs import source  # noqa: E402
 
 
 def count(file: str, macros: list[str], text: str, folder: Path) -> int:

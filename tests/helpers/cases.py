@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -75,6 +77,14 @@ def image_error(image, raw, *, most=None, among=None, exact=exact_image, **model
     wanted, random_norm = exact(raw, image.grid.positions.reshape(-1, 3)[at], **model)
     scale = max(np.linalg.norm(wanted), random_norm)
     return float(np.linalg.norm(np.asarray(image.data).ravel()[at] - wanted) / (scale or 1.0))
+
+
+def planned_within(limits, verb, *subjects, **options):
+    """The plan of a verb of echoes for these arguments, with other values of fields of EchoLimits."""
+    plan = verb.planned(*subjects, **options)
+    request = plan.task.request
+    request = replace(request, limits=replace(request.limits, **limits))
+    return replace(plan, task=replace(plan.task, request=request))
 
 
 def thinned(first, second, every=2, slow=None):

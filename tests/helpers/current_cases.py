@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from sarcl.fullwave import _current_sums, _dispersion
-from sarcl.fullwave._currents import Currents
-from sarcl.fullwave._incident import PlaneWave
-from sarcl.fullwave._pulse import Pulse
+from sarcl.fullwave import dispersion
+from sarcl.fullwave.currents import Currents
+from sarcl.fullwave.incident import PlaneWave
 from sarcl.fullwave.lattice import Lattice
+from sarcl.fullwave.pulse import Pulse
 from sarcl.reference import equations
 
 CELL = 0.02  # m
@@ -30,7 +30,7 @@ def random_currents(n, n_frequencies, shape=(48, 48, 48), cell=CELL, seed=0):
     phasors = rng.normal(size=(4, n_frequencies, n))
     electric, magnetic = ((phasors[a] + 1j * phasors[a + 1]).astype(np.complex64) for a in (0, 2))
     centre = grid.origin + cell * np.array(grid.shape) / 2
-    omega = _dispersion.grid_omega(grid, k, wave.travel)
+    omega = dispersion.grid_omega(grid, k, wave.travel)
     return Currents(grid, wave, centre, k, omega, edges, electric, faces, magnetic, 0, 0.0)
 
 
@@ -42,12 +42,16 @@ def antennas(currents, n, spread, distance=RANGE, seed=1):
 
 
 def twin(currents, paths, tx, rx):
-    out = []
-    for _, offset, values in _current_sums._by_component(currents):
-        out.append(equations.current_sums(
-            offset, values(slice(None)), currents.wave.travel, paths.sent, paths.received, tx - currents.centre,
-            rx - currents.centre,
-        ))  # fmt: skip
+    """Sums over the cells of E x, y, z and H x, y, z in float64 (6, P, F)."""
+    out, size = [], int(np.prod(currents.lattice.shape))
+    for at, values, magnetic in ((currents.edges, currents.electric, 0), (currents.faces, currents.magnetic, 1)):
+        offset = currents.lattice.positions(at, bool(magnetic)) - currents.centre
+        for component in range(3):
+            own = at // size == component
+            out.append(equations.current_sums(
+                offset[own], values[:, own], currents.wave.travel, paths.sent, paths.received, tx - currents.centre,
+                rx - currents.centre,
+            ))  # fmt: skip
     return np.array(out)
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from sarcl.opencl.choose_device import REMEDY, open_device
-from sarcl.opencl.device import Device
+from sarcl.opencl.device import Device, Limits
 from sarcl.opencl.device_list import devices
 
 # Methods that make each twin, as far as they change a device. The first twin compiles, together with the device itself,
@@ -53,6 +53,9 @@ def opened(param):
 
 
 @functools.cache
-def as_gpu(device):
-    """A device of its own that runs all that a GPU runs: one lane, reikna's FFT, uploads beside the computation."""
-    return Device(replace(device.info, kind="gpu", vector_width=1), device._raw)
+def as_gpu(device, **limits):
+    """A device of its own that runs all that a GPU runs: one lane, reikna's FFT, uploads beside the computation.
+
+    limits  fields of Limits: what it does at a time
+    """
+    return Device(replace(device.info, kind="gpu", vector_width=1), device._raw, Limits(**limits))

@@ -12,16 +12,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from sarcl.fullwave import _dispersion
-from sarcl.fullwave._currents import Currents
+from sarcl.fullwave import dispersion
+from sarcl.fullwave.currents import Currents
 from sarcl.fullwave.lattice import COURANT
 
 
 def amplitude(currents: Currents, direction: np.ndarray, polarization: np.ndarray) -> np.ndarray:
     """Amplitudes of the echo that a receiver in `direction` (3,) sees in `polarization` (3,): complex128 (F,), m."""
     grid, towards = currents.lattice, np.asarray(direction) / np.linalg.norm(direction)
-    k = _dispersion.wavenumber(grid, currents.omega, towards)
-    e, h = _dispersion.fields(_dispersion.grid_vector(grid, k, towards), np.asarray(polarization, float))
+    k = dispersion.wavenumber(grid, currents.omega, towards)
+    e, h = dispersion.fields(dispersion.grid_vector(grid, k, towards), np.asarray(polarization, float))
     total = np.zeros(len(k), np.complex128)
     for at, values, unit, magnetic in (
         (currents.edges, currents.electric, e, False), (currents.faces, currents.magnetic, h, True)
@@ -30,7 +30,7 @@ def amplitude(currents: Currents, direction: np.ndarray, polarization: np.ndarra
         component = at // np.prod(grid.shape)
         for f in range(len(k)):
             total[f] += (values[f] * unit[f, component]) @ np.exp(1j * k[f] * path)
-    sent = _dispersion.flux(grid, currents.k, currents.wave.travel)
-    received = _dispersion.flux(grid, k, towards)
+    sent = dispersion.flux(grid, currents.k, currents.wave.travel)
+    received = dispersion.flux(grid, k, towards)
     scale = currents.k * grid.cell**2 / (2 * np.sqrt(np.pi) * COURANT)
     return np.asarray(-scale * total / np.sqrt(sent * received))

@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from sarcl.fullwave import _absorber, runs
-from sarcl.fullwave._incident import entrances
-from sarcl.fullwave.bodies._cut_cells import Intervals
+from sarcl.fullwave import runs
+from sarcl.fullwave.absorber import coefficients
+from sarcl.fullwave.bodies.cut_cells import Intervals
+from sarcl.fullwave.incident import entrances
 from sarcl.fullwave.lattice import COURANT, lattice_around
 from sarcl.fullwave.target import Target
 from sarcl.reference import equations, fdtd
@@ -50,9 +51,7 @@ class Twin:
 
     def _along(self, axis, absorber, magnetic):
         out = np.zeros((2, self.lattice.shape[axis]))
-        out[:, :absorber], out[:, -absorber:] = np.split(
-            np.array(_absorber.coefficients(absorber)[magnetic]), 2, axis=1
-        )
+        out[:, :absorber], out[:, -absorber:] = np.split(np.array(coefficients(absorber)[magnetic]), 2, axis=1)
         return out
 
     def advance(self):

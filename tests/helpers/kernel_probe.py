@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sarcl.opencl import _programs
+from sarcl.opencl import programs
 
 
 def probe(device, monkeypatch, body, inputs, n_out, headers=("common.clh", "doubleword.clh"), **macros):
@@ -29,7 +29,7 @@ def probe(device, monkeypatch, body, inputs, n_out, headers=("common.clh", "doub
 
 def placed(monkeypatch, name, text):
     """OpenCL source text in place of the file kernels/<name>, with its #include lines expanded."""
-    expanded = _programs.source.__wrapped__
+    expanded = programs.source.__wrapped__
 
     def source(file):
         if file != name:

@@ -7,12 +7,9 @@ import shapely
 
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.base.vectors import unit
-from sarcl.opencl.choose_device import open_device
 from sarcl.reference.lit_part import plane_axes
 from sarcl.scattering.physical_optics import scattering_matrix, triangle_integral
-from sarcl.scene.triangles import centroids, cut, normals
-from sarcl.visibility._frame import DevicePoints, Frame
-from sarcl.visibility._ray_casting import Occluders
+from sarcl.scene.triangles import cut
 
 BELOW = 0.999  # of the height of an antenna: occluders above that are nowhere near it
 FAR = 2e6  # m: the waves are plane over scenes of a few metres
@@ -129,11 +126,3 @@ def near_echo(triangles, two_sided, frequencies, antennas, reference_range, edge
             a = k / (2 * np.sqrt(np.pi)) * matrix * triangle_integral(pieces, k * (sights[0] + sights[1]))
             out[i] += (a * np.exp(-2j * np.pi * ((np.longdouble(f) * delay) % 1).astype(float))).sum()
     return out
-
-
-def seen_centroids(device, triangles, viewpoint, *, by_rays=False):
-    """True (k,) where a viewpoint, m (3,), sees the centroid of a facet, m (k, 3, 3); by_rays  through a tree."""
-    opened = open_device(device)
-    frame = Frame.around(triangles.reshape(-1, 3))
-    points = DevicePoints(opened, centroids(triangles), frame, normals(triangles))
-    return points.seen(Occluders(opened, triangles, frame, 0 if by_rays else len(triangles)), [viewpoint])

@@ -19,7 +19,6 @@ from sarcl import verbs
 from sarcl.base.forecast import Plan
 from sarcl.base.options import described, option
 from sarcl.base.verb import verb
-from sarcl.cli import _flags
 from sarcl.imaging.backproject import plan_of
 from sarcl.imaging.backproject_options import BackprojectOptions
 from sarcl.model.image import Image
@@ -27,6 +26,7 @@ from sarcl.model.image_grid import ImageGrid
 from sarcl.model.phase_history import PhaseHistory
 
 ROOT = Path(__file__).parents[2]
+FLAGS = ROOT / "sarcl" / "cli" / "_flags.py"
 SCRIPT = ROOT / "docs" / "developers" / "write_options.py"
 Colour = typing.Literal["red", "100 % green"]
 
@@ -129,15 +129,15 @@ def test_plan_without_a_verb_has_the_signature_of_backproject():
 
 
 def test_flags_are_the_options_and_import_nothing(write):
+    flags = {"__package__": "sarcl.cli"}
+    exec(FLAGS.read_text(), flags)
     for name in write.ON_COMMAND_LINE:
         record = getattr(verbs, name).options
-        assert _flags.DEFAULTS[name] == {n: f.default for n, (f, _) in described(record).items()}
-        for option_name, words in _flags.CHOICES.get(name, {}).items():
+        assert flags["DEFAULTS"][name] == {n: f.default for n, (f, _) in described(record).items()}
+        for option_name, words in flags["CHOICES"].get(name, {}).items():
             check = described(record)[option_name][1].check
             assert [check(option_name, word) for word in words] == list(words) if check else words
-    imported = [
-        ast.unparse(node) for node in ast.parse(Path(_flags.__file__).read_text()).body if "import" in ast.unparse(node)
-    ]
+    imported = [ast.unparse(node) for node in ast.parse(FLAGS.read_text()).body if "import" in ast.unparse(node)]
     assert imported[1:] == ["import json", "from pkgutil import get_data", "from typing import Any"]
 
 

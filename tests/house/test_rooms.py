@@ -60,7 +60,7 @@ def is_private(name: str) -> bool:
 
 @cache
 def importers() -> dict[str, set[str]]:
-    """Module -> the folders of those who import it, from sarcl/, kernels/ and the scripts of bench/."""
+    """Module -> the folders of those who import it, from sarcl/ and the scripts of bench/."""
     out: dict[str, set[str]] = {name: set() for name in files()}
     for name, path in files().items():
         here = name if path.name == "__init__.py" else folder(name)
@@ -75,6 +75,18 @@ def importers() -> dict[str, set[str]]:
     return out
 
 
+@cache
+def outside_tests() -> dict[str, set[str]]:
+    """Module -> the files of tests/ that import it and belong to another room, or to several."""
+    out: dict[str, set[str]] = {name: set() for name in files()}
+    for path in (ROOT / "tests").rglob("*.py"):
+        parts = path.relative_to(ROOT).parts
+        for other in imported(".".join(parts), path):
+            if other.split(".")[1:2] != [parts[1]]:
+                out[other].add("/".join(parts))
+    return out
+
+
 def test_private_files_are_imported_by_their_own_folder_alone():
     wrong = [
         f"{name} is imported by {sorted(others)}"
@@ -85,15 +97,22 @@ def test_private_files_are_imported_by_their_own_folder_alone():
     assert sum(map(is_private, files())) > 50
 
 
+def test_tests_of_other_rooms_import_no_private_file():
+    wrong = {name: sorted(tests) for name, tests in outside_tests().items() if tests and "._" in name}
+    assert not wrong, f"{wrong}: let the tests use public names, stand with the room, or the file have a public name"
+
+
 def test_files_that_only_their_own_folder_imports_are_private():
-    """Not the reference, whose users are the tests; and not what the front door names (sarcl/__init__.pyi)."""
+    """Neither the reference, whose users are the tests, nor what the front door names (sarcl/__init__.pyi), nor what
+    tests of other rooms need.
+    """
     front = imported("sarcl", PACKAGE / "__init__.pyi")
     wrong = [
         name
         for name, users in importers().items()
         if not is_private(name) and name.count(".") > 1 and files()[name].name != "__init__.py"
         and not name.startswith("sarcl.reference.") and name not in front and name not in DOORS_FOR_OTHERS
-        and not users - {folder(name)}
+        and not users - {folder(name)} and not outside_tests()[name]
     ]  # fmt: skip
     assert not wrong, f"{wrong}: let their names begin with an underscore"
     assert all(name in files() and not importers()[name] - {folder(name)} for name in DOORS_FOR_OTHERS)

@@ -21,7 +21,7 @@ from house.annotations import hints_of, namespace, stub
 import sarcl
 from sarcl import motion, shapes
 from sarcl.arrays import map_aperture
-from sarcl.experiments.fda import _array, case
+from sarcl.experiments.fda import case
 from sarcl.imaging import choose_method, focusing_task
 from sarcl.model import antenna
 from sarcl.papers.farooq import range_zones
@@ -176,7 +176,7 @@ def test_options_of_a_shape_are_those_that_it_spells_out(shape):
         ((sarcl.backproject, "method"), choose_method.METHODS),
         ((motion.perturbed, "frame"), motion.FRAMES),
         ((motion.sinusoidal, "frame"), motion.FRAMES),
-        ((case.Case, "progression"), _array.PROGRESSIONS),
+        ((case.Case, "progression"), case.PROGRESSIONS),
         ((case.Case, "path"), case.PATHS),
         ((case.Case, "receive"), echo_options.RECEIVE),
     ],

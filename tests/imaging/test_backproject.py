@@ -10,8 +10,10 @@ import pytest
 from helpers.cases import REPEATED, image_error, noise_history
 
 import sarcl
-from sarcl.base import validation
+from sarcl.base.errors import ToleranceUnreachable
 from sarcl.imaging.backproject import pixels_alone
+from sarcl.imaging.choose_method import choose
+from sarcl.imaging.focusing_task import make_task
 from sarcl.reference.backproject import backproject as exact_image
 
 PLANE = sarcl.ImageGrid.plane(center=(1, 2, 0), shape=(33, 45), spacing=(0.3, 0.2))
@@ -250,14 +252,15 @@ def test_samples_whose_sums_overflow_are_refused():
         sarcl.backproject(raw, PLANE)
 
 
-def test_the_best_tolerance_that_is_named_can_be_asked_for(monkeypatch):
-    monkeypatch.setattr(validation, "LEAST_TOLERANCE", 0.0)  # float64 is exhausted below what users may ask for
+def test_the_best_tolerance_that_is_named_can_be_asked_for():
+    """Below what users may ask for, where float64 is exhausted."""
     raw = noise_history(n_rows=1, n_samples=20000)
     grid = sarcl.ImageGrid.plane(shape=(9, 9), spacing=1.0)
-    with pytest.raises(ValueError, match="best here is") as caught:
-        sarcl.backproject(raw, grid, tolerance=1e-16)
-    named = float(str(caught.value).split()[-1])
-    assert sarcl.backproject(raw, grid, tolerance=named).report.predicted_error <= named
+    task = make_task(raw, grid, None, None, False, True, None)
+    with pytest.raises(ToleranceUnreachable) as caught:
+        choose(task, "auto", 1e-16)
+    best = caught.value.best
+    assert 1e-16 < best < 1e-11 and choose(task, "auto", best).predicted_error <= best
 
 
 BAD = {

@@ -11,7 +11,6 @@ from helpers.cases import image_error, noise_history, noise_on, straight
 from helpers.devices import as_gpu
 
 import sarcl
-from sarcl.imaging import engine
 from sarcl.opencl.device import Device
 
 GRID = sarcl.ImageGrid.plane(center=(1, 2, 0), shape=(60, 50), spacing=(0.03, 0.02))
@@ -23,6 +22,8 @@ CASES = {
     "beam": (GRID, 1e-3, {"beam": (6e-5, (-0.7, 0, -0.714)), "window": (None, "hamming")}),
     "float64": (GRID, 1e-9, {}),
 }
+
+FIVE_BLOCKS = {"upload": 64 * 16 * 8}  # bytes of 64 rows of 16 samples, of 280
 
 
 @pytest.fixture
@@ -40,16 +41,15 @@ def calls(monkeypatch):
 @pytest.mark.parametrize(
     "case", [pytest.param(c, marks=[pytest.mark.slow] if c in ("many taps", "listed points") else []) for c in CASES]
 )
-def test_images_meet_their_tolerance_in_blocks_of_rows(device, case, calls, monkeypatch):
+def test_images_meet_their_tolerance_in_blocks_of_rows(device, case, calls):
     grid, tolerance, options = CASES[case]
     if case == "float64" and not device.info.fp64:
         pytest.skip("no float64")
     options = dict(options)
     raw = noise_history(n_rows=280, n_samples=16, bistatic=options.pop("bistatic", False))
-    monkeypatch.setattr(engine, "UPLOAD", 64 * 16 * 8)  # blocks of 64 rows: five of them
     progress = []
     image = sarcl.backproject(
-        raw, grid, tolerance=tolerance, method="direct", device=as_gpu(device), check=True,
+        raw, grid, tolerance=tolerance, method="direct", device=as_gpu(device, **FIVE_BLOCKS), check=True,
         progress=lambda *report: progress.append(report[1:]), **options,
     )  # fmt: skip
     assert image.report.measured_error <= image.report.predicted_error <= tolerance
@@ -61,10 +61,10 @@ def test_images_meet_their_tolerance_in_blocks_of_rows(device, case, calls, monk
     assert calls.index("finish") > max(i for i, name in enumerate(calls) if name == "mark")
 
 
-def test_a_step_begins_while_the_one_before_runs(device, calls, monkeypatch):
+def test_a_step_begins_while_the_one_before_runs(device, calls):
     raw = noise_history(n_rows=280, n_samples=16)
-    monkeypatch.setattr(engine, "UPLOAD", 64 * 16 * 8)
-    sarcl.backproject(raw, GRID, tolerance=1e-2, method="direct", device=as_gpu(device), check=False)
+    gpu = as_gpu(device, **FIVE_BLOCKS)
+    sarcl.backproject(raw, GRID, tolerance=1e-2, method="direct", device=gpu, check=False)
     uploads = [i for i, name in enumerate(calls) if name == "write_behind"]
     marks, waits = ([i for i, name in enumerate(calls) if name == kind] for kind in ("mark", "wait"))
     assert len(uploads) == 3 * len(marks) == 15  # samples, weights and geometry of each block
@@ -104,16 +104,16 @@ def test_samples_too_large_for_the_sums_of_the_device_are_summed_on_the_host_or_
         sarcl.backproject(scaled, small, tolerance=1e-3, method="direct", device=gpu)
 
 
-def test_an_interrupt_leaves_nothing_running(device, calls, monkeypatch):
+def test_an_interrupt_leaves_nothing_running(device, calls):
     raw = noise_history(n_rows=280, n_samples=16)
-    monkeypatch.setattr(engine, "UPLOAD", 64 * 16 * 8)
+    gpu = as_gpu(device, **FIVE_BLOCKS)
 
     def stop(stage, done, total):
         if done:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        sarcl.backproject(raw, GRID, tolerance=1e-2, method="direct", device=as_gpu(device), progress=stop)
+        sarcl.backproject(raw, GRID, tolerance=1e-2, method="direct", device=gpu, progress=stop)
     assert calls[-1] == "finish" and calls.count("finish") == 1 and calls.count("mark") == 2
 
 

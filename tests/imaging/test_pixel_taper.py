@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers import strip_map
-from helpers.cases import noise_history
+from helpers.cases import noise_history, thinned
 
 import sarcl
 from sarcl.base.constants import SPEED_OF_LIGHT
@@ -59,8 +59,7 @@ def raw():
     return replace(made, samples=noise.astype(np.complex64))
 
 
-@pytest.mark.parametrize("grid", [GRID, LISTED], ids=["plane", "points"])
-@pytest.mark.parametrize("tolerance", [1e-2, 1e-5, 1e-8])
+@pytest.mark.parametrize("tolerance, grid", thinned([1e-2, 1e-5, 1e-8], [LISTED, GRID]))
 def test_the_image_is_the_exactly_tapered_sum(device, raw, grid, tolerance):
     if tolerance < 1e-6 and not device.info.fp64:
         pytest.skip("no float64")

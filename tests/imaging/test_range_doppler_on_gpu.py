@@ -67,11 +67,10 @@ def test_samples_of_double_precision_and_finer_rows(device):
 
 
 @pytest.mark.parametrize("upload", [2**26, 30 * 80 * 16])  # one block of rows, and several
-def test_samples_go_up_once_and_the_image_comes_down_once(device, upload, monkeypatch):
-    monkeypatch.setattr(_focus_on_device, "UPLOAD", upload)
+def test_samples_go_up_once_and_the_image_comes_down_once(device, upload):
     raw = noise()
     with moved_bytes() as moved:
-        image = sarcl.range_doppler(raw, tolerance=1e-2, device=as_gpu(device), check=False)
+        image = sarcl.range_doppler(raw, tolerance=1e-2, device=as_gpu(device, upload=upload), check=False)
     plan = image.report.plan
     bins, length = (int(str(plan["Doppler bins"]).split()[i]) for i in (0, -1))
     lines = bins * (20 * -(-image.data.shape[1] // 64) + 12)
@@ -123,12 +122,11 @@ def test_sums_that_a_device_may_not_hold_are_the_hosts_or_refused(device):
             sarcl.range_doppler(faint, device=gpu, **options)
 
 
-def test_blocks_of_rows_may_weigh_nothing(device, monkeypatch):
-    monkeypatch.setattr(_focus_on_device, "UPLOAD", 20 * 80 * 16)
+def test_blocks_of_rows_may_weigh_nothing(device):
     raw = noise()
     options = {"weights": np.arange(200) >= 100.0, "check": False}  # as the looks are made of which a rate is found
     with moved_bytes() as moved:
-        image = sarcl.range_doppler(raw, device=as_gpu(device), **options)
+        image = sarcl.range_doppler(raw, device=as_gpu(device, upload=20 * 80 * 16), **options)
     assert moved.down == image.data.nbytes
     wanted = sarcl.range_doppler(raw, device=device, **options)
     assert np.linalg.norm(image.data - wanted.data) <= 4e-6 * np.linalg.norm(wanted.data)

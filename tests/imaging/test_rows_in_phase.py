@@ -9,7 +9,6 @@ import sarcl
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.imaging import choose_method, profile_energy
 from sarcl.imaging.focusing_task import make_task
-from sarcl.imaging.profile_energy import RowsInPhase
 from sarcl.numerics import interpolation, interpolator_choice
 from sarcl.opencl import fft
 
@@ -94,7 +93,7 @@ def test_errors_of_few_rows_are_those_planned_for(seeds):
 
 
 def test_errors_that_add_up_in_power_alone_would_be_exceeded(monkeypatch):
-    monkeypatch.setattr(RowsInPhase, "ratio", lambda self, length: 0.0)
+    monkeypatch.setattr(profile_energy.RowsInPhase, "ratio", lambda self, length: 0.0)
     assert len(exceeded(range(150))) >= 3
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sarcl.imaging.tiling._points import PointTiling
 from sarcl.imaging.tiling.of_grid import tiling_of
 from sarcl.model.image_grid import ImageGrid
 
@@ -17,9 +16,8 @@ GRIDS = {"plane": PLANE, "points": ImageGrid.points(CELLS), "points and empty ce
 
 
 @pytest.fixture(params=GRIDS)
-def tiling(request, monkeypatch):
-    monkeypatch.setattr(PointTiling, "LISTED_BAND", 700)
-    made = tiling_of(GRIDS[request.param], 8)
+def tiling(request):
+    made = tiling_of(GRIDS[request.param], 8, listed=700)
     made.source = GRIDS[request.param]
     return made
 

@@ -12,7 +12,7 @@ from helpers.cases import noise_on, straight
 
 import sarcl
 from sarcl.io import output_paths
-from sarcl.opencl import _programs
+from sarcl.opencl import programs
 
 RAW = noise_on(straight(16), n_samples=32)
 GRID = sarcl.ImageGrid.plane(shape=(64, 64), spacing=0.1)
@@ -88,6 +88,6 @@ def test_a_limit_on_files_that_would_end_pocl_is_told_before_it_builds(monkeypat
     resource = pytest.importorskip("resource")
     monkeypatch.setattr(resource, "getrlimit", lambda which: (51200, resource.RLIM_INFINITY))
     with pytest.raises(OSError, match=r"kernels cannot be built: files may have 51\.2 kB .*\(ulimit -f\).*raise the"):
-        _programs._check_file_limit()
+        programs._check_file_limit()
     monkeypatch.setattr(resource, "getrlimit", lambda which: (resource.RLIM_INFINITY,) * 2)
-    _programs._check_file_limit()
+    programs._check_file_limit()

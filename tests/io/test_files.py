@@ -14,9 +14,9 @@ from scipy.io import savemat
 
 import sarcl
 from sarcl.cli.parser import main
-from sarcl.io import _checksums, formats, hdf5, output_paths, sarcl_hdf5
+from sarcl.io import formats, hdf5, output_paths, sarcl_hdf5
 from sarcl.model import store
-from sarcl.model._row_fields import PER_ROW
+from sarcl.model.phase_history import PER_ROW
 
 DATA = Path(os.environ.get("SARCL_DATA") or Path(__file__).parents[2] / "../shared/data")
 GOTCHA = [DATA / "gotcha" / f"data_3dsar_pass1_az00{n}_HH.mat" for n in (1, 2)]
@@ -126,18 +126,6 @@ def test_folders_and_files_without_write_permission_are_refused(tmp_path):
             output_paths.check_writable(tmp_path / "b.h5")
     finally:
         tmp_path.chmod(0o755)
-
-
-def test_rows_written_in_order_are_not_read_again_for_their_checksums():
-    rows = np.arange(_checksums.BLOCK_BYTES // 8 * 5 // 2, dtype=np.complex64).reshape(-1, 8)
-    sums = _checksums.RunningSums(rows.shape, rows.dtype)
-    each = len(rows) // 7
-    for first in range(0, len(rows), each):
-        sums.wrote(slice(first, min(first + each, len(rows))), rows[first : first + each])
-    assert len(sums.sums) == 3
-    found = sums.of(None)  # there is nothing to read
-    sums.wrote(slice(3, 4), rows[3:4])
-    assert sums.of(rows) == found
 
 
 def test_a_full_disk_is_found_before_the_work(tmp_path):

@@ -53,12 +53,12 @@ def flipped(path, at, bit=0):
 # Checksums -------------------------------------------------------------------------------------------------
 
 
-def test_damaged_rows_are_named_and_the_others_can_be_read(tmp_path, monkeypatch):
-    monkeypatch.setattr(_checksums, "BLOCK_BYTES", 8 * M * 50)  # 50 rows
-    raw = saved(tmp_path / "a.h5")
+def test_damaged_rows_are_named_and_the_others_can_be_read(tmp_path):
+    m = _checksums.BLOCK_BYTES // (8 * 50)  # samples, so that a block has 50 rows
+    raw = saved(tmp_path / "a.h5", m=m)
     with h5py.File(tmp_path / "a.h5") as file:
         start = file["samples"].id.get_offset()
-    flipped(tmp_path / "a.h5", start + 8 * M * 120 + 5)
+    flipped(tmp_path / "a.h5", start + 8 * m * 120 + 5)
     found = sarcl.read(tmp_path / "a.h5")
     for rows in (slice(120, 121), slice(0, 300), slice(149, 90, -1), 120, [3, 120], (slice(100, 130), slice(2, 3))):
         with pytest.raises(OSError, match=r"a\.h5' is damaged: rows 100 to 149 of samples are not as they were"):
@@ -72,22 +72,22 @@ def test_damaged_rows_are_named_and_the_others_can_be_read(tmp_path, monkeypatch
     assert np.array_equal(found.samples[-1], raw.samples[-1])
 
 
-def test_rows_in_any_order_get_the_checksums_of_what_was_written(tmp_path, monkeypatch):
-    monkeypatch.setattr(_checksums, "BLOCK_BYTES", 8 * 5 * 4)  # 4 rows
-    rng = np.random.default_rng(1)
-    values = (rng.normal(size=(30, 5)) + 1j * rng.normal(size=(30, 5))).astype(np.complex64)
+def test_rows_in_any_order_get_the_checksums_of_what_was_written(tmp_path):
+    m = _checksums.BLOCK_BYTES // (8 * 4)  # columns, so that a block has 4 rows
+    values = np.random.default_rng(1).normal(size=(2, 30, m)).astype(np.float32)
+    values = values[0] + 1j * values[1]
     orders = {
         "in order": [(slice(a, a + 3), values[a : a + 3]) for a in range(0, 30, 3)],
         "backwards": [(slice(a, a + 3), values[a : a + 3]) for a in range(27, -1, -3)],
         "twice": [(slice(0, 30), -values), (slice(0, 30), values)],
-        "by columns": [((slice(None), slice(j, j + 1)), values[:, j : j + 1]) for j in range(5)],
+        "by columns": [((slice(None), slice(j, j + m // 4)), values[:, j : j + m // 4]) for j in range(0, m, m // 4)],
         "row by row": [(i, values[i]) for i in range(30)],
         "of another type": [(slice(None), values.astype(np.complex128))],
         "in part": [(slice(4, 9), values[4:9])],
     }
     for name, writes in orders.items():
         wanted = np.zeros_like(values)
-        with sarcl_hdf5.ImageWriter(tmp_path / "a.h5", {"shape": (30, 5), "center": np.zeros(3)}) as out:
+        with sarcl_hdf5.ImageWriter(tmp_path / "a.h5", {"shape": (30, m), "center": np.zeros(3)}) as out:
             for at, block in writes:
                 out.data[at] = wanted[at] = block
             out.close({"gain": 1.0})
@@ -95,6 +95,18 @@ def test_rows_in_any_order_get_the_checksums_of_what_was_written(tmp_path, monke
         assert type(rows).__name__ == "CheckedRows", name
         assert np.array_equal(rows[:], wanted) and np.array_equal(rows[3:21:5], wanted[3:21:5]), name
         rows.file.close()
+
+
+def test_rows_written_in_order_are_not_read_again_for_their_checksums():
+    rows = np.arange(_checksums.BLOCK_BYTES // 8 * 5 // 2, dtype=np.complex64).reshape(-1, 8)
+    sums = _checksums.RunningSums(rows.shape, rows.dtype)
+    each = len(rows) // 7
+    for first in range(0, len(rows), each):
+        sums.wrote(slice(first, min(first + each, len(rows))), rows[first : first + each])
+    assert len(sums.sums) == 3
+    found = sums.of(None)  # there is nothing to read
+    sums.wrote(slice(3, 4), rows[3:4])
+    assert sums.of(rows) == found
 
 
 @pytest.mark.parametrize("name", ["tx", "frequency", "reference_range"])

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import sarcl
-from sarcl.io import _mesh_checks
 
 CORNERS = [(0, 2), (0, 0), (2, 0), (2, 1), (1, 1), (1, 2)]  # an L, whose fan about the first corner covers 4 m^2 of 3
 
@@ -47,18 +46,29 @@ def test_concave_polygons_are_refused_and_convex_ones_are_covered(tmp_path):
         assert area(sarcl.Scene.from_mesh(written(tmp_path / name, text), repair=False)) == pytest.approx(1.5), name
 
 
-def test_fans_cover_what_turns_one_way_about_their_first_corner():
+def polygon(path, corners):
+    """A mesh file of one polygon, m (k, 3)."""
+    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in corners.tolist()]
+    return written(path, "\n".join([*lines, "f " + " ".join(str(i + 1) for i in range(len(corners)))]))
+
+
+def test_fans_cover_what_turns_one_way_about_their_first_corner(tmp_path):
     """Convex polygons from any corner, turned and far away; of concave ones a fan from the corner that sees all."""
     random = np.random.default_rng(1)
     turn = np.linalg.qr(random.normal(size=(3, 3)))[0]
     for n in (4, 5, 8, 60):
         angle = 2 * np.pi * (np.arange(n) + random.uniform(0, 0.9, n)) / n
         circle = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
-        assert _mesh_checks.fans_fit(np.array([np.roll(circle, i, axis=0) @ turn + 100 for i in range(n)])).all()
+        wanted = np.sin(np.diff(angle, append=angle[0] + 2 * np.pi)).sum() / 2
+        for i in range(0, n, -(-n // 4)):
+            scene = sarcl.Scene.from_mesh(polygon(tmp_path / "a.obj", np.roll(circle, i, axis=0) @ turn + 100))
+            assert len(scene.triangles) == n - 2 and area(scene) == pytest.approx(wanted, rel=1e-9)
     dart = np.array([[0, 0, 0], [2, -1, 0], [1, 0, 0], [2, 1, 0]], float) @ turn + 100
-    assert _mesh_checks.fans_fit(np.array([np.roll(dart, -i, axis=0) for i in range(4)])).tolist() == [
-        True, False, True, False,
-    ]  # fmt: skip
+    for i in (0, 2):
+        assert area(sarcl.Scene.from_mesh(polygon(tmp_path / "a.obj", np.roll(dart, -i, axis=0)))) == pytest.approx(1)
+    for i in (1, 3):
+        with pytest.raises(ValueError, match="is concave"):
+            sarcl.Scene.from_mesh(polygon(tmp_path / "a.obj", np.roll(dart, -i, axis=0)))
 
 
 def test_indices_of_obj_files_count_from_1_or_back_from_their_line(tmp_path):

@@ -12,7 +12,7 @@ import pytest
 
 import sarcl
 from sarcl.base.constants import SPEED_OF_LIGHT
-from sarcl.model._row_fields import PER_ROW
+from sarcl.model.phase_history import PER_ROW
 
 TOLERANCE = {
     "time signal": 1e-12,  # float64 FFT against the float64 sum, relative to the largest value

@@ -8,7 +8,6 @@ from helpers.devices import as_gpu
 
 from sarcl.numerics import device_profiles, interpolation, range_profiles
 from sarcl.numerics.device_profiles import DeviceProfiles, SpreadSamples
-from sarcl.opencl import fft
 
 SINGLE, DOUBLE = np.complex64, np.complex128
 
@@ -31,11 +30,11 @@ CASES = [
 
 
 @pytest.mark.parametrize("n_samples, length, pad, dtype, kind", CASES)
-def test_profiles_of_the_device_are_those_of_the_host(device, n_samples, length, pad, dtype, kind, monkeypatch):
+def test_profiles_of_the_device_are_those_of_the_host(device, n_samples, length, pad, dtype, kind):
     if not device.info.fp64 and DOUBLE in (dtype, kind):
         pytest.skip("no float64")
-    monkeypatch.setattr(fft, "AT_ONCE", 2 * length)  # rows of a block in parts, the last one short
-    gpu, random = as_gpu(device), np.random.default_rng(1)
+    gpu = as_gpu(device, transform=2 * length)  # rows of a block in parts, the last one short
+    random = np.random.default_rng(1)
     across, along = random.uniform(-1, 1, n_samples), random.uniform(0.1, 3, 5)
     samples = noise(5, n_samples, kind)
     maker = DeviceProfiles(gpu, across, length, pad, dtype)
@@ -89,9 +88,8 @@ def test_the_rows_that_fit_are_the_most_whose_bytes_do(device):
 
 
 @pytest.mark.parametrize("n_samples, length, parts", [(37, 80, 3), (8, 64, 1), (1, 16, 2)])
-def test_samples_of_spread_profiles_are_those_of_the_host(device, n_samples, length, parts, monkeypatch):
-    monkeypatch.setattr(fft, "AT_ONCE", 2 * length)
-    gpu, kernel = as_gpu(device), interpolation.interpolator(4, 2.0)
+def test_samples_of_spread_profiles_are_those_of_the_host(device, n_samples, length, parts):
+    gpu, kernel = as_gpu(device, transform=2 * length), interpolation.interpolator(4, 2.0)
     samples = SpreadSamples(gpu, n_samples, kernel, length)
     stride = length + 2 * range_profiles.padding(kernel)
     for rows in (5, 3):

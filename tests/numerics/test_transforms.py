@@ -54,9 +54,9 @@ def test_rows_are_taken_from_the_middle_of_a_buffer(device, still):
 
 
 @pytest.mark.parametrize("sign", [1, -1])
-def test_columns_are_transformed_in_their_place_in_batches(device, monkeypatch, sign):
-    gpu, array, length = as_gpu(device), noise((24, 10)), 24
-    monkeypatch.setattr(fft, "AT_ONCE", 4 * length)
+def test_columns_are_transformed_in_their_place_in_batches(device, sign):
+    array, length = noise((24, 10)), 24
+    gpu = as_gpu(device, transform=4 * length)
     buffer, made = gpu.copied(array), Transforms(gpu, length, 10)
     ones = gpu.copied(np.ones(length, np.float32)), length
     assert made.most == 4 and made.nbytes == 4 * (8 * length + fft.temporary_bytes(length, np.complex64))

@@ -8,7 +8,7 @@ import pytest
 from helpers.cases import noise_history
 
 import sarcl
-from sarcl.opencl import _programs
+from sarcl.opencl import programs
 from sarcl.opencl.choose_device import open_device
 from sarcl.opencl.device import Device
 from sarcl.opencl.failures import DeviceFailed
@@ -95,7 +95,7 @@ def test_a_program_without_kernels_is_said_to_come_from_a_damaged_cache():
     program = open_device()
     built = pyopencl.Program(program.context, "void nothing(void) {}").build()
     with pytest.raises(RuntimeError, match=r"a program without kernels: its cache of built programs.* may be damaged"):
-        _programs.kernels_of(built)
+        programs.kernels_of(built)
 
 
 def test_two_threads_on_one_device_compute_what_one_after_the_other_does():

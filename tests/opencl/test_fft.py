@@ -9,8 +9,7 @@ import pytest
 from helpers.devices import as_gpu
 
 from sarcl.opencl import fft
-from sarcl.opencl._launches import LASTS
-from sarcl.opencl.device import Device
+from sarcl.opencl.device import Device, Limits
 
 
 def noise(rows, length):
@@ -33,26 +32,24 @@ def planned(monkeypatch):
 
 
 @pytest.mark.parametrize("inverse", [False, True])
-def test_rows_in_batches_are_those_of_one_batch_to_the_bit(device, monkeypatch, planned, inverse):
-    gpu, data = as_gpu(device), noise(13, 96)
-    whole = fft.rows(gpu, data, inverse=inverse)
+def test_rows_in_batches_are_those_of_one_batch_to_the_bit(device, planned, inverse):
+    data = noise(13, 96)
+    whole = fft.rows(as_gpu(device), data, inverse=inverse)
     planned.clear()
-    monkeypatch.setattr(fft, "AT_ONCE", 4 * 96 + 5)
-    assert np.array_equal(fft.rows(gpu, data, inverse=inverse), whole)
+    assert np.array_equal(fft.rows(as_gpu(device, transform=4 * 96 + 5), data, inverse=inverse), whole)
     assert planned == 4 * [(4, 96)]  # of the last batch three rows are not used
 
 
 def test_batches_are_smaller_on_slow_devices(device):
     fast, slow, slowest = (Device(replace(device.info, kind="gpu", rate=r), device._raw) for r in (1e12, 1e9, 1e3))
-    assert fft.rows_at_once(fast, 1024) == fft.AT_ONCE // 1024
-    assert fft.rows_at_once(slow, 1024) == int(LASTS * 1e9 / fft.SAMPLE) // 1024 < fft.rows_at_once(fast, 1024)
+    assert fft.rows_at_once(fast, 1024) == fast.limits.transform // 1024
+    assert fft.rows_at_once(slow, 1024) == int(fft.LASTS * 1e9 / fft.SAMPLE) // 1024 < fft.rows_at_once(fast, 1024)
     assert fft.rows_at_once(slowest, 1024) == 1
 
 
 def test_a_launch_that_lasts_long_makes_the_next_batches_smaller(device, monkeypatch, planned):
-    gpu, data = Device(replace(device.info, kind="gpu"), device._raw), noise(40, 64)
-    monkeypatch.setattr(fft, "AT_ONCE", 16 * 64)
-    monkeypatch.setattr(fft, "lasted", lambda event, enqueued: LASTS * planned[-1][0] / 5)  # five rows in LASTS
+    gpu, data = Device(replace(device.info, kind="gpu"), device._raw, Limits(transform=16 * 64)), noise(40, 64)
+    monkeypatch.setattr(fft, "lasted", lambda event, enqueued: fft.LASTS * planned[-1][0] / 5)  # five rows in fft.LASTS
     made = fft.rows(gpu, data, engine="reikna")
     assert np.linalg.norm(made - np.fft.fft(data)) <= 1e-6 * np.linalg.norm(made)
     assert planned == [(16, 64), *5 * [(5, 64)]]

@@ -8,8 +8,8 @@ import pytest
 from helpers.kernel_probe import placed
 
 from sarcl.opencl import launch_numbers as module
-from sarcl.opencl._programs import source
 from sarcl.opencl.launch_numbers import launch_numbers
+from sarcl.opencl.programs import source
 
 PROBE = """
 typedef struct {
@@ -40,9 +40,9 @@ STRUCT = re.compile(r"typedef struct \{[^}]*\} (\w+_numbers);")
 @pytest.fixture
 def probe(monkeypatch):
     placed(monkeypatch, "probe.cl", PROBE)
-    module._layout.cache_clear()
+    module.struct_layout.cache_clear()
     yield
-    module._layout.cache_clear()
+    module.struct_layout.cache_clear()
 
 
 def test_every_number_arrives_where_its_name_says(device, probe):
@@ -68,7 +68,7 @@ def test_every_struct_has_the_same_size_and_places_on_the_device(device, monkeyp
     layouts, text, body = [], "", ""
     for file in KERNELS:
         for struct in STRUCT.finditer(source(file)):
-            layout, name = module._layout(file, struct[1]), f"{file[:-3]}_{struct[1]}"
+            layout, name = module.struct_layout(file, struct[1]), f"{file[:-3]}_{struct[1]}"
             text += struct[0].replace(f" {struct[1]};", f" {name};") + "\n"
             body += f"    {{ {name} s; *out++ = sizeof(s);"
             body += "".join(f" *out++ = (char *)&s.{member} - (char *)&s;" for member in layout.names) + " }\n"

@@ -13,7 +13,7 @@ import sarcl
 from sarcl import papers
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.cli import parser
-from sarcl.fullwave.bodies._mesh_lines import mesh_lines
+from sarcl.fullwave.bodies.mesh_lines import mesh_lines
 from sarcl.fullwave.lattice import lattice_around
 from sarcl.imaging.compress import compress
 from sarcl.opencl.choose_device import open_device

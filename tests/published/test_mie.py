@@ -9,13 +9,13 @@ from helpers.far_field import amplitude
 
 from sarcl import shapes
 from sarcl.base.constants import SPEED_OF_LIGHT
-from sarcl.fullwave._currents import currents
-from sarcl.fullwave._incident import PlaneWave
-from sarcl.fullwave._pulse import Pulse
-from sarcl.fullwave.bodies._cut_cells import conductor
-from sarcl.fullwave.bodies._mesh_lines import mesh_lines
+from sarcl.fullwave.bodies.cut_cells import conductor
 from sarcl.fullwave.bodies.materials import Body, bodies
+from sarcl.fullwave.bodies.mesh_lines import mesh_lines
+from sarcl.fullwave.currents import currents
+from sarcl.fullwave.incident import PlaneWave
 from sarcl.fullwave.lattice import lattice_around, sphere_intervals
+from sarcl.fullwave.pulse import Pulse
 from sarcl.fullwave.target import material_edges
 from sarcl.reference.mie import conducting_sphere, dielectric_sphere
 

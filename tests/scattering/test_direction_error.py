@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from helpers.cases import thinned
 from helpers.facet_cases import WET, echo_and_integral, plate, random_units, still
 
 import sarcl
@@ -139,8 +140,7 @@ def test_what_turns_alike_or_is_seen_from_the_side_costs_nothing():
     assert direction_error(scene, PulseGeometry(aside, above)).turn(1.0) == pytest.approx(both)
 
 
-@pytest.mark.parametrize("height", [0.2, 1.0, 4.0, 20.0, 100.0])
-@pytest.mark.parametrize("material", [METAL, WET], ids=["metal", "soil"])
+@pytest.mark.parametrize("height, material", thinned([0.2, 1.0, 4.0, 20.0, 100.0], [WET, METAL]))
 def test_grazing_facets_are_computed_as_exactly_as_the_tolerance_says(height, material):
     """Where the cosine is small its rounding counts: at 4e-3, float32 sums of soil had 1.6 times the tolerance."""
     tx, rx = np.array([5e3, 1e3, height]), np.array([1e3, 4e3, 2e3])

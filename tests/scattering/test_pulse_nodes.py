@@ -72,7 +72,7 @@ def test_shared_or_not_the_same_echoes_and_counts(device, monkeypatch):
     scene = hills(8, BOTH, edge=0.4) + sarcl.Scene.facets(
         [[[-2.0, 0, 0], [2, 0, 0], [0, 0.02, 3]], [[0, 2, 0.0], [1, 2, 0], [1, 2.0, 2]]], material=ROUGH
     )
-    tx = sarcl.Trajectory.line(start=(-300, -6e3, 4e3), velocity=(600, 300, 0), prf=150.0, n_pulses=150)
+    tx = sarcl.Trajectory.line(start=(-300, -6e3, 4e3), velocity=(600, 300, 0), prf=100.0, n_pulses=70)
     rx = sarcl.Trajectory(tx.times, tx.positions + np.array([200.0, 300, -500]))
     made = []
     for worth in (0, 1e12):

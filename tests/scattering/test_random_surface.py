@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from helpers.cases import thinned
 
 import sarcl
-from sarcl.scattering._random_surface import cell_edge, pieces_of
+from sarcl.scattering.random_surface import cell_edge, pieces_of
 
 CHIRP = sarcl.Waveform.chirp(center=9.6e9, bandwidth=300e6, duration=1e-6)
 ROUGH = sarcl.Material(eps_r=4.0, conductivity=1e-3, diagram="cos2")
@@ -33,8 +34,9 @@ SURFACES = {
 }
 
 
-@pytest.mark.parametrize("name", SURFACES)
-@pytest.mark.parametrize("other", [{"tolerance": 1e-2}, {"max_edge": 0.11}, {"max_bytes": 1e8}], ids=str)
+@pytest.mark.parametrize(
+    "name, other", thinned(SURFACES, [{"tolerance": 1e-2}, {"max_edge": 0.11}, {"max_bytes": 1e8}])
+)
 def test_tolerance_max_edge_and_max_bytes_leave_the_surface_as_it_is(name, other):
     scene = SURFACES[name]
     one = sarcl.echo(scene, CHIRP, track(), tolerance=5e-2, seed=3, **GIVEN)

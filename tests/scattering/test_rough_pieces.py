@@ -6,15 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from helpers.cases import REPEATED, planned_within
 
 import sarcl
-from sarcl.numerics.tiles import tile_points
 from sarcl.reference import facet_pieces
 from sarcl.scattering import rough_pieces
-from sarcl.scattering._random_surface import ROUND, cell_edge, pieces_of
+from sarcl.scattering.random_surface import ROUND, cell_edge, pieces_of
 from sarcl.scattering.rough_pieces import RoughFacets, RoughPieces
 from sarcl.scene import triangles as geometry
-from sarcl.simulation._piece_tiling import PieceTiling
 
 COS, SHARP = sarcl.Material(diagram="cos"), sarcl.Material(eps_r=4.0, conductivity=1e-3, diagram="exp", width=0.5)
 CHIRP = sarcl.Waveform.chirp(center=9.6e9, bandwidth=150e6, duration=1e-6)
@@ -121,26 +120,6 @@ def test_numbers_of_pieces_are_those_that_the_host_writes(double, roughness):
     assert np.array_equal(planes[exact], wanted[exact]) and not planes[:6, n:].any()
 
 
-@pytest.mark.parametrize("per_tile", [64, 256])
-def test_tiles_hold_their_pieces(double, per_tile):
-    one = terrain(5) + scene(TRIANGLES["one that is not cut"])
-    pieces = RoughPieces.cut(double, one.moved((300.0, -2e3, 7.0)), 0.4, 0)
-    tiling = PieceTiling(pieces, *RoughFacets(pieces).tiling_numbers(np.array([9.6e9]), True, False))
-    tiles = tiling.tiles(per_tile)
-    assert tiling.tiles(per_tile) is tiles
-    wanted, order = tile_points(
-        geometry.centroids(pieces.corners()[0]), tiling.center, per_tile, np.arange(len(pieces))
-    )
-    assert (tiles.n_tiles, tiles.last) == (wanted.n_tiles, per_tile - (len(order) - len(pieces)))
-    assert tiles.last < per_tile
-    references = double.download(tiles.references, np.empty((2, 3, tiles.n_tiles), np.float32)).sum(axis=0, dtype=float)
-    assert np.abs(references.T - wanted.references).max() < 1e-12
-    assert tiling.radius[per_tile] == pytest.approx(wanted.radius.max(), rel=1e-12)
-    offsets = double.download(tiles.offsets, np.empty((6, tiles.n_offsets), np.float32))[:, : len(order)]
-    # positions of 2 km round by 2e-13 m, float32 pairs of offsets in the last of 48 bits
-    assert np.abs(offsets[:3].astype(float) + offsets[3:] - wanted.offsets[:3] - wanted.offsets[3:]).max() < 1e-12
-
-
 def test_samples_represent_all_pieces(double):
     steps = np.concatenate([TRIANGLES["many"], 8 * TRIANGLES["many"][:3]])
     pieces = RoughPieces.cut(double, scene(steps), 0.2, 0)
@@ -169,14 +148,16 @@ SCENES = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", ["terrain", "two-sided sheets", "random heights in shadow", *(
+    pytest.param(name, marks=REPEATED) for name in ("random heights", "terrain that hides nothing", "a box on terrain")
+)])  # fmt: skip
 def test_echoes_are_those_of_pieces_cut_on_the_host(double, monkeypatch, name):
-    monkeypatch.setattr("sarcl.scattering.scatterers.FEW_LOOKS", 0)  # shadows are shares
     one, shadows = SCENES[name][0](), SCENES[name][1]
     ask = {"tolerance": 2e-2 if shadows else 1e-4, "seed": 3, "device": double, "shadows": shadows, "check": True}
-    here = sarcl.echo(one, CHIRP, track(), **ask)
+    plan = planned_within({"few_looks": 0}, sarcl.echo, one, CHIRP, track(), **ask)  # shadows are shares
+    here = plan.run()
     monkeypatch.setattr(RoughPieces, "suits", staticmethod(lambda device, scene: False))
-    there = sarcl.echo(one, CHIRP, track(), **ask)
+    there = plan.run()
     assert here.report.measured_error <= here.report.predicted_error
     assert np.linalg.norm(here.samples - there.samples) <= ask["tolerance"] / 10 * np.linalg.norm(there.samples)
     assert here.report.contributions_done == there.report.contributions_done

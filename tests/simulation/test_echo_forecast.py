@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from helpers.array_cases import TONE, line, passing
+from helpers.cases import planned_within
 
 import sarcl
 from sarcl.base.errors import NothingSeen
 from sarcl.base.report import root_sum_square
-from sarcl.scattering import scatterers
-from sarcl.simulation import _echo_forecast as echo_forecast
 from sarcl.simulation import _planned_echoes as planned_echoes
 from sarcl.simulation._echo_work import pieces_of
+from sarcl.simulation._single_channel import SingleEchoes
 from sarcl.simulation.spectral import _spectral_plan
 
 CHIRP = sarcl.Waveform.chirp(center=9.6e9, bandwidth=150e6, duration=1e-6)
@@ -44,45 +46,40 @@ def call(request):
     return (make(), waveform, track), options
 
 
-@pytest.fixture
-def prepared(monkeypatch):
-    """Forecasts prepare every scene."""
-    monkeypatch.setattr(echo_forecast, "LEAST", np.inf)
+PREPARED = {"prepared_seconds": np.inf}  # forecasts prepare every scene
+UNPREPARED = {"prepared_seconds": 0.0, "prepared_share": 0.0}  # forecasts prepare no scene
 
 
-@pytest.fixture
-def unprepared(monkeypatch):
-    """Forecasts prepare no scene."""
-    monkeypatch.setattr(echo_forecast, "LEAST", 0.0)
-    monkeypatch.setattr(echo_forecast, "SHARE", 0.0)
+def forecast(limits, *subjects, **options):
+    return planned_within(limits, sarcl.echo, *subjects, **options).forecast()
 
 
 def same(raw, other):
     return np.array_equal(raw.samples, other.samples) and raw.report.plan == other.report.plan
 
 
-def test_errors_of_a_prepared_scene_are_those_of_the_run(prepared, call):
+def test_errors_of_a_prepared_scene_are_those_of_the_run(call):
     subjects, options = call
-    told, raw = sarcl.plan(sarcl.echo, *subjects, **options), sarcl.echo(*subjects, **options)
+    told, raw = forecast(PREPARED, *subjects, **options), sarcl.echo(*subjects, **options)
     assert told.predicted_error == raw.report.predicted_error and told.error_terms == raw.report.error_terms
     assert (told.n_rows, told.n_samples) == raw.samples.shape and told.seconds > told.planning > 0
     assert {name: told.plan[name] for name in raw.report.plan} == raw.report.plan
 
 
-def test_errors_of_a_scene_that_is_not_prepared_are_bounds(unprepared, call):
+def test_errors_of_a_scene_that_is_not_prepared_are_bounds(call):
     subjects, options = call
-    told, raw = sarcl.plan(sarcl.echo, *subjects, **options), sarcl.echo(*subjects, **options)
+    told, raw = forecast(UNPREPARED, *subjects, **options), sarcl.echo(*subjects, **options)
     assert raw.report.predicted_error <= told.predicted_error <= options["tolerance"] * (1 + 1e-12)
     assert told.predicted_error == root_sum_square(told.error_terms)
     assert told.seconds > 0 and told.plan["method"] == raw.report.plan["method"]
     assert same(told.run(), raw)
 
 
-def test_the_shares_of_shadows_that_are_sampled_bound_their_errors(unprepared, monkeypatch):
-    monkeypatch.setattr(scatterers, "FEW_LOOKS", 0.0)
+def test_the_shares_of_shadows_that_are_sampled_bound_their_errors():
     ground = sarcl.shapes.plate((12.0, 12.0), material=sarcl.Material(diagram="cos"))
     subjects, options = (box().moved((0, 0, 0.6)) + ground + points(), CHIRP, TRACK), {"tolerance": 5e-2}
-    told, raw = sarcl.plan(sarcl.echo, *subjects, **options), sarcl.echo(*subjects, **options)
+    plan = planned_within(UNPREPARED | {"few_looks": 0.0}, sarcl.echo, *subjects, **options)
+    told, raw = plan.forecast(), plan.run()
     assert [term.name for term in told.error_terms] == ["points", "facets", "shadows"]
     named = {term.name: term.value for term in raw.report.error_terms}
     shadows = np.hypot(named["shadow edges"], named["motion of shadows"])
@@ -91,9 +88,9 @@ def test_the_shares_of_shadows_that_are_sampled_bound_their_errors(unprepared, m
     assert told.predicted_error <= options["tolerance"] * (1 + 1e-12)
 
 
-def test_a_run_does_not_plan_again_and_may_be_repeated(prepared, call, monkeypatch):
+def test_a_run_does_not_plan_again_and_may_be_repeated(call, monkeypatch):
     subjects, options = call
-    raw, told = sarcl.echo(*subjects, **options), sarcl.plan(sarcl.echo, *subjects, **options)
+    raw, told = sarcl.echo(*subjects, **options), forecast(PREPARED, *subjects, **options)
     for name in ("prepare_scene", "planned_scene"):
         monkeypatch.setattr(planned_echoes, name, lambda *given, **more: pytest.fail("planned again"))
     first = told.run()
@@ -102,9 +99,9 @@ def test_a_run_does_not_plan_again_and_may_be_repeated(prepared, call, monkeypat
     assert seconds["plan"] + seconds["scene"] >= told.planning > 0 and seconds["echo"] > 0
 
 
-def test_progress_is_that_of_the_run_alone(prepared):
+def test_progress_is_that_of_the_run_alone():
     stages = []
-    told = sarcl.plan(sarcl.echo, points(), CHIRP, TRACK, progress=lambda stage, done, total: stages.append(stage))
+    told = forecast(PREPARED, points(), CHIRP, TRACK, progress=lambda stage, done, total: stages.append(stage))
     assert stages == []
     told.run()
     assert "echo" in stages
@@ -118,9 +115,9 @@ def test_pieces_are_counted_to_a_factor_of_two(name):
     assert n / 2 <= sum(pieces_of(planned.scene)) <= 2 * n
 
 
-def test_a_scene_outside_the_range_window_is_refused(unprepared):
+def test_a_scene_outside_the_range_window_is_refused():
     with pytest.raises(NothingSeen, match="outside the range window"):
-        sarcl.plan(sarcl.echo, points(), CHIRP, TRACK, range_window=(100, 120))
+        forecast(UNPREPARED, points(), CHIRP, TRACK, range_window=(100, 120))
 
 
 def test_a_forecast_of_spectral_echo_is_that_of_its_run(monkeypatch):
@@ -134,3 +131,17 @@ def test_a_forecast_of_spectral_echo_is_that_of_its_run(monkeypatch):
         with monkeypatch.context() as patched:
             patched.setattr(_spectral_plan, "plan_parts", lambda *given: pytest.fail("planned again"))
             assert same(told.run(), raw) and same(told.run(), raw)
+
+
+def test_a_forecast_times_other_pulses_only_where_nothing_is_seen(monkeypatch):
+    tried, fill = [], SingleEchoes.fill
+
+    def unseen(method, scene, samples, start, done, total):
+        tried.append(start)
+        added = fill(method, scene, samples, start, done, total)
+        return replace(added, counts=replace(added.counts, outside_window=added.counts.pairs))
+
+    sarcl.plan(sarcl.echo, points(), CHIRP, TRACK)
+    monkeypatch.setattr(SingleEchoes, "fill", unseen)
+    assert sarcl.plan(sarcl.echo, points(), CHIRP, TRACK).plan["contributions"] == 0
+    assert len(set(tried)) == 3

@@ -9,7 +9,7 @@ import sys
 import numpy as np
 import pytest
 from helpers.array_cases import F0, SCENE, TONE, WINDOW, line, passing
-from helpers.cases import SCENARIO
+from helpers.cases import SCENARIO, thinned
 
 import sarcl
 from sarcl import shapes
@@ -25,8 +25,7 @@ ARRAYS = {
 }
 
 
-@pytest.mark.parametrize("scene", [SCENE, FACETS], ids=["points", "facets"])
-@pytest.mark.parametrize("name", ARRAYS)
+@pytest.mark.parametrize("name, scene", thinned(ARRAYS, [SCENE, FACETS]))
 def test_a_file_holds_what_memory_would(name, scene, tmp_path):
     options = {"polarization": ("HH", "VV"), "reference": (0, 0, 0), "range_window": WINDOW, "tolerance": 1e-3}
     options |= ARRAYS[name]

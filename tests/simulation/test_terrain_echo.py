@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from helpers.cases import planned_within
 from scipy.ndimage import gaussian_filter
 
 import sarcl
@@ -63,40 +64,42 @@ SCENES = {
 OPTIONS = {"tolerance": 1e-2, "check": False, "max_edge": 0.5}
 
 
+def sampled_echo(*subjects, **options):
+    """Echoes as of scenes too large for lit parts at every pulse."""
+    return planned_within({"few_looks": 0}, sarcl.echo, *subjects, **options).run()
+
+
 @pytest.mark.parametrize("name", SCENES)
-def test_heights_change_no_shadow_on_rough_terrain(name, sampled, monkeypatch):
-    monkeypatch.setattr(scatterers, "FEW_LOOKS", 0)
+def test_heights_change_no_shadow_on_rough_terrain(name, sampled):
     scene = SCENES[name]()
-    known, unknown = (sarcl.echo(one, WAVE, track(), **OPTIONS) for one in (scene, without(scene)))
+    known, unknown = (sampled_echo(one, WAVE, track(), **OPTIONS) for one in (scene, without(scene)))
     assert [ground is None for ground in sampled] == [False, True]
     norm = np.linalg.norm(unknown.samples)
     assert np.linalg.norm(known.samples - unknown.samples) <= 1e-3 * norm
     assert known.report.plan["shadow edges"].startswith("sampled, ")
     shadowed = [r.report.contributions_skipped["shadowed"] for r in (known, unknown)]
     assert shadowed[0] == pytest.approx(shadowed[1], rel=1e-3) and shadowed[0] > 0
-    dark = sarcl.echo(without(scene), WAVE, track(), **OPTIONS, shadows=False)
+    dark = sampled_echo(without(scene), WAVE, track(), **OPTIONS, shadows=False)
     assert np.linalg.norm(dark.samples - unknown.samples) > 0.1 * norm
 
 
 def test_terrain_below_every_line_of_sight_hides_what_stands_under_it_alone(monkeypatch):
     """Gentle hills are left out as occluders, but for a box that is half in the ground."""
-    monkeypatch.setattr(scatterers, "FEW_LOOKS", 0)
     ground, asked = hills(height=0.3), []
     lit = illumination.lit
     monkeypatch.setattr(scatterers, "lit", lambda *given, **options: asked.append(options) or lit(*given, **options))
     scene = ground + shapes.box((4, 3, 3), material=LAMBERT).moved((5, 5, 0.2))
-    known, unknown = (sarcl.echo(one, WAVE, track(), **OPTIONS) for one in (scene, without(scene)))
+    known, unknown = (sampled_echo(one, WAVE, track(), **OPTIONS) for one in (scene, without(scene)))
     assert np.linalg.norm(known.samples - unknown.samples) <= 1e-2 * np.linalg.norm(unknown.samples)
     floor, over = asked[0]["ground"]
     assert len(floor) == len(ground.triangles) and len(asked[0]["occluders"]) == 12
     assert 0 < over.sum() < 0.1 * len(over) and asked[1]["ground"] is None
 
 
-def test_large_smooth_terrain_is_clipped_like_a_small_one(sampled, monkeypatch):
+def test_large_smooth_terrain_is_clipped_like_a_small_one(sampled):
     scene = hills(material=sarcl.Material(eps_r=4.0))
     exact = sarcl.echo(scene, WAVE, track(n=2), **OPTIONS)
-    monkeypatch.setattr(scatterers, "FEW_LOOKS", 0)
-    raw = sarcl.echo(scene, WAVE, track(n=2), **OPTIONS)
+    raw = sampled_echo(scene, WAVE, track(n=2), **OPTIONS)
     assert sampled == [] and "shadow edges" not in raw.report.plan
     np.testing.assert_array_equal(raw.samples, exact.samples)
 
@@ -129,15 +132,14 @@ def test_scenes_keep_heights_as_long_as_they_are_theirs():
     assert facets_on(made.heights, made.triangles).all() and 0.1 < (made.heights[2] - rough.heights[2]).std() < 0.3
 
 
-def test_what_is_no_longer_all_of_a_terrain_is_taken_by_its_facets(sampled, monkeypatch):
-    monkeypatch.setattr(scatterers, "FEW_LOOKS", 0)
+def test_what_is_no_longer_all_of_a_terrain_is_taken_by_its_facets(sampled):
     scene = hills(n=20)
     holed = scene.part(np.arange(len(scene.triangles)) != 7)
     shifted = replace(scene, triangles=scene.triangles + np.array([0, 0, 0.5]))
     sheared = hills(n=20, point_roughness=0.1)
     sheared = replace(sheared, point_roughness=sheared.point_roughness[..., ::-1]).realized(1)  # moves sideways
     for other in (holed, shifted, sheared):
-        sarcl.echo(other, WAVE, track(n=4), tolerance=1e-1, check=False)
+        sampled_echo(other, WAVE, track(n=4), tolerance=1e-1, check=False)
     assert sampled == [None] * 3
 
 
@@ -147,10 +149,9 @@ def test_an_antenna_under_the_terrain_is_refused():
         sarcl.echo(scene, WAVE, sarcl.Trajectory([0.0], [[5.0, 5.0, -400.0]]), max_edge=5.0, tolerance=1e-1)
 
 
-def test_no_shadow_is_looked_for_on_terrain_below_lines_of_sight_steeper_than_its_slopes(monkeypatch, sampled):
-    monkeypatch.setattr(scatterers, "FEW_LOOKS", 0)
+def test_no_shadow_is_looked_for_on_terrain_below_lines_of_sight_steeper_than_its_slopes(sampled):
     above, low = (
-        sarcl.echo(hills(height=1.5), WAVE, track(elevation, n=4), tolerance=3e-2) for elevation in (1.2, 0.15)
+        sampled_echo(hills(height=1.5), WAVE, track(elevation, n=4), tolerance=3e-2) for elevation in (1.2, 0.15)
     )
     assert len(sampled) == 1 and low.report.contributions_skipped["shadowed"] > 0
     assert above.report.contributions_skipped.get("shadowed", 0) == 0
@@ -163,8 +164,7 @@ def test_other_ray_casters_are_refused():
         sarcl.echo(hills(n=4), WAVE, track(n=4), shadows="embree")
 
 
-def test_shadows_move_evenly_between_the_pulses_at_which_they_are_found(monkeypatch):
-    monkeypatch.setattr(scatterers, "FEW_LOOKS", 0)  # of scenes too large for lit parts at every pulse
+def test_shadows_move_evenly_between_the_pulses_at_which_they_are_found():
     # as a pole's shadow sweeps over the ground; the check takes the shares of every pulse
     x, n = np.linspace(-20, 20, 31), 240
     ground = sarcl.Scene.from_heights(x, x, np.zeros((31, 31))).triangles
@@ -173,7 +173,7 @@ def test_shadows_move_evenly_between_the_pulses_at_which_they_are_found(monkeypa
     scene = sarcl.Scene.facets(np.concatenate([ground, pole]), two_sided=False, material=rough)
     track = sarcl.Trajectory.circle(radius=7e3, height=7e3, arc=0.5, n_pulses=n, prf=100.0)
     chirp = sarcl.Waveform.chirp(center=0.3e9, bandwidth=50e6, duration=1e-6)
-    report = sarcl.echo(
+    report = sampled_echo(
         scene, chirp, track, range_window=(-40, 40), max_edge=None, seed=3, tolerance=1e-2, check=True
     ).report
     assert report.contributions_skipped["shadowed"] > 0

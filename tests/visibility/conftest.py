@@ -8,5 +8,5 @@ from helpers.devices import opened, variants
 
 @pytest.fixture(params=variants(()))
 def device(request):
-    """An open device; tests/opencl/test_cl.py holds that the kernels name nothing that a twin changes."""
+    """An open device; tests/opencl/test_open_device.py holds that the kernels name nothing that a twin changes."""
     return opened(request.param)

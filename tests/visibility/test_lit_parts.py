@@ -136,8 +136,8 @@ def test_a_pole_that_passes_between_two_pulses_is_found_at_the_pulse_that_it_hid
 @pytest.mark.parametrize("seed", range(6))
 def test_candidate_pairs_leave_out_no_pair_that_meets_from_any_pulse(seed):
     random = np.random.default_rng(seed)
-    receivers = random.uniform(-5, 5, (24, 1, 3)) + random.standard_normal((24, 3, 3)) * random.choice([0.05, 0.5])
-    occluders = random.uniform(-5, 5, (24, 1, 3)) + random.standard_normal((24, 3, 3)) * random.choice([0.05, 2.0])
+    receivers = random.uniform(-5, 5, (16, 1, 3)) + random.standard_normal((16, 3, 3)) * random.choice([0.05, 0.5])
+    occluders = random.uniform(-5, 5, (16, 1, 3)) + random.standard_normal((16, 3, 3)) * random.choice([0.05, 2.0])
     middle = random.standard_normal(3)
     middle *= random.choice([2.0, 20.0, 500.0]) / np.linalg.norm(middle)
     turn = 0.02

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from helpers.cases import thinned
 
 import sarcl
 from sarcl.scene.terrain import above
@@ -26,8 +27,7 @@ def walled(wall, n=241, size=240.0):
     return x, x, wall(*np.meshgrid(x, x))
 
 
-@pytest.mark.parametrize("turned", [False, True])
-@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize("side, turned", thinned([1, -1], [False, True]))
 def test_a_ridge_shadows_the_ground_up_to_where_the_line_over_its_top_ends(device, turned, side):
     """A radar H high sees over a ridge h high, g away, what is beyond g H/(H - h): not a plane wave's h tan."""
     h, high, g = 20.0, 100.0, 90.0
@@ -54,8 +54,7 @@ def test_a_ring_wall_shadows_a_ring_around_the_point_under_the_radar(device):
     assert (share[(away < radius - 2.6) | (away > radius * high / (high - h) + 2)] == 255).all()
 
 
-@pytest.mark.parametrize("elevation", [0.5, 3, 30, 88])
-@pytest.mark.parametrize("tilt", [(0, 0), (0.004, -0.003), (0.2, -0.3)])
+@pytest.mark.parametrize("elevation, tilt", thinned([0.5, 3, 30, 88], [[0, 0], [0.004, -0.003], [0.2, -0.3]]))
 def test_nothing_is_hidden_on_a_plane(device, elevation, tilt):
     x, y = np.linspace(-90, 90, 91), np.linspace(-50, 70, 131)
     z = tilt[0] * x + tilt[1] * y[:, None] + 400

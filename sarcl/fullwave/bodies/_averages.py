@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ._cut_cells import Box, Intervals, free_lengths
+from .cut_cells import Box, Intervals, free_lengths
 
 LINES = [(m, n) for m in (-1, 0, 1) for n in (-1, 0, 1)]  # places of lines, half cells across their axis
 SIMPSON = 2 / 3, 1 / 6  # weights of lines through a point, and half a cell beside it: mean over a cell

@@ -22,7 +22,7 @@ import numpy as np
 from ..lattice import COURANT, Lattice
 from ..target import VACUUM_PERMITTIVITY
 from ._averages import Contents, averages, mixed_cells
-from ._cut_cells import Box, Intervals
+from .cut_cells import Box, Intervals
 
 LEAST_CELLS = 4  # per wavelength in a dielectric, and 2 pi times the depth that waves reach
 LEAST = 1e-6  # difference of a permittivity from 1, and coupling, of edges that are listed
@@ -55,7 +55,7 @@ def conductivities(lattice: Lattice, permittivity: np.ndarray, k: float) -> np.n
     """S/m, (n,): what gives permittivities eps' - j eps'' (n,) on the grid at k, rad/m.
 
     The grid takes E as the mean of two steps where it drives a current, and differences for derivatives: eps'' is
-    conductivity dt/(2 eps_0 tan(omega dt/2)), at the frequency where |K| of `_dispersion`, averaged over directions, is
+    conductivity dt/(2 eps_0 tan(omega dt/2)), at the frequency where |K| of `dispersion`, averaged over directions, is
     that of a wavenumber k.
     """
     turn = _half_turn(lattice, k)

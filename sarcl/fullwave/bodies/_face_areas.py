@@ -13,7 +13,7 @@ import numpy as np
 
 from ..lattice import Lattice
 from ._closed_mesh import ClosedMesh
-from ._cut_cells import FaceAreas
+from .cut_cells import FaceAreas
 
 
 def face_areas(lattice: Lattice, mesh: ClosedMesh, axis: int) -> FaceAreas:

@@ -11,10 +11,10 @@ from ...base.errors import TooThin
 from ...base.validation import number
 from ..lattice import Lattice
 from ..target import Target, material_edges
-from ._cut_cells import Box, Intervals, conductor, edge_lengths
 from ._dielectrics import Lines, check_cells, conductivities, halved, lagging_weights, on_grid, permittivities
-from ._mesh_lines import MeshLines, mesh_lines
 from ._thin_parts import RIM as RIM
+from .cut_cells import Box, Intervals, conductor, edge_lengths
+from .mesh_lines import MeshLines, mesh_lines
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ LEAST_INSIDE = 6.0  # cells per wavelength in a body; the run that predicts the 
 def check_bodies(scene: Scene) -> None:
     """ValueError where a scene has points, terrain, rough or partly reflecting facets.
 
-    Whether the bodies are closed is seen when they are cut by the lines of the grid (`_mesh_lines`).
+    Whether the bodies are closed is seen when they are cut by the lines of the grid (`mesh_lines`).
     """
     said = "scene has {}, and fullwave_echo computes closed bodies of smooth facets: {}"
     if len(scene.positions):

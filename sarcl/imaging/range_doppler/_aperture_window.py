@@ -40,16 +40,20 @@ class ApertureWindow:
     error: float
 
     @classmethod
-    def over(cls, low: float, high: float, table: np.ndarray, zone: float, allowed: float) -> ApertureWindow:
+    def over(
+        cls, low: float, high: float, table: np.ndarray, zone: float, allowed: float, *,
+        inwards: tuple[float, ...] = INWARDS,
+    ) -> ApertureWindow:  # fmt: skip
         """The window over a beam from `low` to `high`, sines, with an error of at most `allowed`.
 
-        table  W at the middles of even cells of 0 <= u <= 1, as windows.table makes it
-        zone   width of a Fresnel zone, as a sine
+        table    W at the middles of even cells of 0 <= u <= 1, as windows.table makes it
+        zone     width of a Fresnel zone, as a sine
+        inwards  shares of the smooth ends that may lie within the beam, from the smallest on
         """
         zones = LEAST_ZONES
         while True:
-            for inwards in INWARDS:
-                window = cls._smoothed(low, high, table, zone, zones, inwards)
+            for share in inwards:
+                window = cls._smoothed(low, high, table, zone, zones, share)
                 if window.error > allowed or window.outside(low, high) <= OUTSIDE:
                     break
             if window.error <= allowed:

@@ -30,7 +30,6 @@ from ._plan import SEGMENT, FocusPlan
 
 LENGTHS = 3  # lengths of FFTs: along the track, of range profiles, back; the programs of each keep their memory
 WORK = 1 / 16  # share of a budget for the rows that are transformed at a time, with one of these lengths
-UPLOAD = 2**26  # bytes of samples that are uploaded at a time
 PIECE = 64  # rows that the host refers to one range at a time
 BLOCKS = 8  # blocks of Doppler bins, at least, so that the host works on one while the device does another
 
@@ -180,7 +179,7 @@ def _refer(job: Job, rows: _Array, weigher: WeightedSamples, room: Room) -> bool
     """Weighted rows of one reference range, made on the device; False where it may not hold their sums."""
     raw = job.raw
     rows.buffer = job.device.empty(8 * rows.shape[0] * rows.shape[1])
-    at_once = max(1, int(min(room.remainder, UPLOAD) // weigher.row_bytes))
+    at_once = max(1, int(min(room.remainder, job.device.limits.upload) // weigher.row_bytes))
     with Pipeline(job.device) as pipeline:
         for start in range(0, raw.n_rows, at_once):
             stop = min(start + at_once, raw.n_rows)

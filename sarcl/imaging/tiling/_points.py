@@ -14,6 +14,7 @@ from ...numerics.tiles import Tiles, tile_points
 from ...opencl.device import Buffer, Device
 from .tiling import FlatImage, Orders, Part, Roots, Run, Section, Tiling, Tree
 
+LISTED = 2**18  # points of a band, the unit in which an image is made and its tiles are kept
 KEPT = 2**25  # points of a grid whose order is kept, in 4 bytes each
 
 
@@ -38,28 +39,27 @@ class _Curve:
         return order
 
 
-_curves: WeakKeyDictionary[ImageGrid, _Curve] = WeakKeyDictionary()
+_curves: WeakKeyDictionary[ImageGrid, dict[int, _Curve]] = WeakKeyDictionary()  # by the points of a band
 
 
 class PointTiling(Tiling):
-    """Listed points in tiles along a space-filling curve. A band is LISTED_BAND points in the order of the list."""
-
-    LISTED_BAND = 2**18
+    """Listed points in tiles along a space-filling curve. A band is `listed` points in the order of the list."""
 
     row_shape, in_rows, offset_bytes, leaf_sides = (), False, 24, (16,)
 
-    def __init__(self, grid: ImageGrid, side: int) -> None:
+    def __init__(self, grid: ImageGrid, side: int, listed: int = LISTED) -> None:
         super().__init__(grid, side)
+        self.listed = listed
         self.empty = None if grid.empty is None else grid.empty.ravel()
-        self.n_bands = -(-grid.size // self.LISTED_BAND)
+        self.n_bands = -(-grid.size // listed)
         self._full = [self._cells(b) for b in range(self.n_bands)]
-        self._curve = _curves.setdefault(grid, _Curve())
+        self._curve = _curves.setdefault(grid, {}).setdefault(listed, _Curve())
         if side not in self._curve.radii:
             self._curve.radii[side] = max(float(self.band(b)[0].radius.max()) for b in range(self.n_bands))
         self.radius = self._curve.radii[side]
 
     def extent(self, first: int, last: int) -> slice:
-        return slice(first * self.LISTED_BAND, min(last * self.LISTED_BAND, self.grid.size))
+        return slice(first * self.listed, min(last * self.listed, self.grid.size))
 
     def pixels(self, first: int, last: int) -> int:
         return sum(self._padded(b) for b in range(first, last))

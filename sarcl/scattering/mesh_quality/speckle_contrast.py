@@ -9,8 +9,8 @@ C, standard deviation over mean of the intensity, is 1 for speckle. g, the mean 
 up to over its squared mean, says how unevenly a lattice of pairs, a third of a diagonal apart, covers the image: 1 for
 s1, s2 <= 1; sinc^2 has a triangle for a transform. s1 s2/2 is a facet's area, in cells. The term (4/9) s1 s2/2, with
 4/9 = (integral sinc^4/(integral sinc^2)^2)^2, corrects for the finite number of unit-amplitude scatterers per cell; it
-vanishes for facets whose diagram gives them Rayleigh amplitudes. tests/scattering/test_fineness.py holds this against
-such sums; docs/theory/facets.md.
+vanishes for facets whose diagram gives them Rayleigh amplitudes. tests/scattering/test_mesh_quality.py holds this
+against such sums; docs/theory/facets.md.
 
 source   moments of sums of independent phasors: Goodman 2007, "Speckle phenomena in optics", section 3.6
 """

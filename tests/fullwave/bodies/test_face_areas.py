@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from sarcl import shapes
-from sarcl.fullwave.bodies._closed_mesh import closed_mesh
-from sarcl.fullwave.bodies._face_areas import face_areas
+from sarcl.fullwave.bodies.mesh_lines import mesh_lines
 from sarcl.fullwave.lattice import Lattice
 from sarcl.scene.triangles import rotation
 
@@ -38,7 +37,7 @@ def in_box(low, high):
 
 def shares(triangles, axis):
     """Nodes of the faces that are listed, (n, 3), and their covered shares (n,)."""
-    found = face_areas(GRID, closed_mesh(GRID, triangles), axis)
+    found = mesh_lines(GRID, triangles).areas[axis]
     return np.stack(np.unravel_index(found.places, GRID.shape), axis=1), found.covered
 
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from sarcl import shapes
-from sarcl.fullwave._dispersion import grid_vector
 from sarcl.fullwave.bodies import _dielectrics
-from sarcl.fullwave.bodies._cut_cells import conductor
-from sarcl.fullwave.bodies._mesh_lines import mesh_lines
+from sarcl.fullwave.bodies.cut_cells import conductor
 from sarcl.fullwave.bodies.materials import Body, bodies
+from sarcl.fullwave.bodies.mesh_lines import mesh_lines
+from sarcl.fullwave.dispersion import grid_vector
 from sarcl.fullwave.lattice import COURANT, Lattice
 from sarcl.fullwave.target import material_edges
 from sarcl.scene.triangles import rotation

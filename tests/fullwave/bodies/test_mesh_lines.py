@@ -8,10 +8,9 @@ from helpers.devices import opened, variants
 
 import sarcl
 from sarcl import shapes
-from sarcl.fullwave.bodies import _mesh_lines
 from sarcl.fullwave.bodies._closed_mesh import closed_mesh
-from sarcl.fullwave.bodies._cut_cells import conductor
-from sarcl.fullwave.bodies._mesh_lines import mesh_lines
+from sarcl.fullwave.bodies.cut_cells import conductor
+from sarcl.fullwave.bodies.mesh_lines import _crossings, mesh_lines
 from sarcl.fullwave.fields import BLOCK, Fields
 from sarcl.fullwave.lattice import Lattice, lattice_around
 from sarcl.scene.triangles import rotation
@@ -156,7 +155,7 @@ def test_every_line_leaves_as_often_as_it_enters_where_corners_lie_on_nodes():
             mesh = closed_mesh(GRID, corners)
             met = 0
             for axis in range(3):
-                found = _mesh_lines._crossings(GRID, mesh, axis)
+                found = _crossings(GRID, mesh, axis)
                 met += len(found.exact)
                 assert (np.bincount(found.line, weights=found.turn) == 0).all()
             assert met > 30

@@ -81,7 +81,7 @@ def mirrored_coupling(weight, axis):
     return out
 
 
-@pytest.mark.parametrize("seed", range(50))
+@pytest.mark.parametrize("seed", [pytest.param(n, marks=pytest.mark.slow if n >= 15 else ()) for n in range(50)])
 def test_a_mirrored_pair_of_bodies_has_mirrored_coefficients_and_a_translated_one_the_same(seed):
     metal, dielectric = pair(seed)
     edges, faces, coupling = coefficients(metal, dielectric)

@@ -11,7 +11,6 @@ from helpers.cases import noise_on
 
 import sarcl
 from sarcl.base.constants import SPEED_OF_LIGHT
-from sarcl.imaging.range_doppler import _aperture_window
 from sarcl.imaging.range_doppler._aperture_window import ApertureWindow
 from sarcl.imaging.range_doppler.range_doppler import _row_weights, gain_of
 from sarcl.numerics import windows
@@ -155,12 +154,12 @@ def test_points_at_the_end_of_a_strip_are_as_bright_as_in_its_middle():
 
 
 @pytest.mark.parametrize("zones", [8, 30])
-def test_the_error_of_weights_is_that_of_the_smooth_ends_of_a_beam(zones, monkeypatch):
-    monkeypatch.setattr(_aperture_window, "INWARDS", (1 / 8,))  # of the width, whatever is left beyond the beam
+def test_the_error_of_weights_is_that_of_the_smooth_ends_of_a_beam(zones):
     # measured with white noise for ends of k Fresnel zones: 0.45/(k^3 sqrt n), docs/theory/range_doppler.md
     box = np.ones(windows.TABLE)
     half = zones * ZONE / 2
-    made = ApertureWindow.over(-half, half, box, ZONE, 3e-3)
+    # an eighth of the width within the beam, whatever share of the rows is left beyond it
+    made = ApertureWindow.over(-half, half, box, ZONE, 3e-3, inwards=(1 / 8,))
     width = np.ptp(made.ends) / ZONE - zones
     k = width / (1 - 2 / 8)  # the window begins an eighth of a width within the beam
     assert made.error == pytest.approx(0.5 / (k**3 * np.sqrt(zones)), rel=0.35) and made.error <= 3e-3
@@ -186,3 +185,12 @@ def test_smoothing_keeps_the_window_and_its_sum(window):
     assert np.abs(made.weights - wanted)[middle].max() < 0.03
     assert made.weights.sum() * step / (2 * half) == pytest.approx(table.mean(), rel=0.02)
     assert made.weight(np.array([-2 * half, 2 * half])) == pytest.approx([0, 0], abs=0)
+
+
+def test_a_window_beside_the_direction_of_flight_counts_no_rows_beyond_it():
+    """The window's smooth end reaches sines above 1, under which no row sees anything: the share of rows was NaN."""
+    made = ApertureWindow.over(0.9, 1.0, windows.table("hamming"), 0.002, 3e-2)
+    assert made.sines[-1] > 1
+    rows = made.weights[made.sines < 1] / (1 - made.sines[made.sines < 1] ** 2) ** 1.5
+    beyond = made.sines[made.sines < 1] < 0.9
+    assert made.outside(0.9, 1.0) == pytest.approx(rows[beyond].sum() / rows.sum(), rel=1e-12)

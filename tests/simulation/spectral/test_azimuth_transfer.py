@@ -1,4 +1,4 @@
-"""Responses along the track against their closed form, and amplitudes that are sums of products."""
+"""Responses along the track against their closed form, amplitudes that are sums of products, and the time they take."""
 
 from __future__ import annotations
 
@@ -7,9 +7,11 @@ import pytest
 import scipy.special
 
 import sarcl
+from sarcl.simulation.spectral import _azimuth_transfer
 from sarcl.simulation.spectral._aspect_expansion import AmplitudeSamples, AspectExpansion, expand
 from sarcl.simulation.spectral._aspect_window import aspects, wavenumber
 from sarcl.simulation.spectral._azimuth_transfer import response_error, transfer_tables
+from sarcl.simulation.spectral._planning_time import PlanningTime
 from sarcl.simulation.spectral._straight_track import straight_track, tangent
 
 
@@ -164,3 +166,38 @@ def test_rounding_of_terms_that_cancel_is_predicted():
         amplitudes, np.zeros(2), np.full(2, 10.0), some[:1], np.zeros(1, int), np.array([[5001.0], [-5000.0]]), 0.0
     )
     assert 7e-3 <= samples.error(found) <= 3e-2
+
+
+def few_pulses_far_away():
+    """7 pulses 0.1 mm apart and 1000 km from three points: half a kilometre of track is a Fresnel zone at 0.6 GHz."""
+    track = sarcl.Trajectory.line(start=(-7e5, 0, 7e5), velocity=(0, 1, 0), prf=1e4, n_pulses=7)
+    points = sarcl.Scene.points([[0, 0, 0], [30, 20, 0], [-40, 10, 0.0]])
+    return points, sarcl.Waveform.chirp(center=6e8, bandwidth=1e7, duration=1e-5), track
+
+
+def test_a_plan_of_spectral_echo_that_takes_longer_than_echo_is_refused(monkeypatch):
+    """It compared responses over millions of pulse intervals, for minutes, of which the track has seven."""
+    for name in ("response_error", "transfer_tables"):
+        monkeypatch.setattr(_azimuth_transfer, name, lambda *given: pytest.fail("responses were transformed"))
+    says = r"seen over \d{6,} pulse intervals, of which the track has 7; .* echo takes about .* in all: use echo"
+    forecast = sarcl.plan(sarcl.echo, *few_pulses_far_away())
+    assert forecast.plan["spectral_echo"].startswith("not planned: that takes long beside echo")
+    for variant in ("exact", "saras"):
+        with pytest.raises(ValueError, match=says):
+            sarcl.spectral_echo(*few_pulses_far_away(), variant=variant)
+
+
+def test_the_time_of_a_plan_is_that_of_all_its_steps():
+    with pytest.raises(ValueError, match=r"more than 1\.2 s"):
+        PlanningTime(7, 0.0, longest=1.0).spend(1e7, 5000)
+    limit = PlanningTime(7, 0.0)
+    limit.spend(3e7, 5000)  # 3.6 s
+    with pytest.raises(ValueError, match=r"more than 7\.2 s, and echo takes about 0 s"):
+        limit.spend(3e7, 5000)
+    many = PlanningTime.of_echo(100_000, 10_000, 1000, 2, False)  # 280 us for each pulse and polarisation: 56 s
+    many.spend(4.6e8, 110_000)
+    with pytest.raises(ValueError, match="more than 57 s, and echo takes about 56 s"):
+        many.spend(1.5e7, 110_000)
+    facets = PlanningTime.of_echo(100_000, 10_000, 1000, 1, True)
+    with pytest.raises(ValueError, match="echo takes about 3 min"):
+        facets.spend(2e9, 110_000)

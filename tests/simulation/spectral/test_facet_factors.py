@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from helpers.cases import thinned
 
 import sarcl
 from sarcl import pointing
 from sarcl.numerics.pulse_geometry import PulseGeometry
-from sarcl.scattering._random_surface import pieces_of
 from sarcl.scattering.antenna_weights import weights_of
 from sarcl.scattering.physical_optics import normals_and_areas
+from sarcl.scattering.random_surface import pieces_of
 from sarcl.scattering.scatterers import ShadowRule, facets_of
 from sarcl.simulation.spectral import _facet_factors as factors
 from sarcl.simulation.spectral._scatterer_amplitudes import ScattererAmplitudes
@@ -34,8 +35,7 @@ ANTENNAS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("antenna", ANTENNAS)
-@pytest.mark.parametrize("material", MATERIALS)
+@pytest.mark.parametrize("material, antenna", thinned(MATERIALS, ANTENNAS))
 def test_factors_of_facets_are_their_amplitudes(material, antenna, every_device, monkeypatch):
     monkeypatch.setattr(factors, "AT_ONCE", 100)  # blocks
     line = sarcl.Trajectory.line(start=(0, -60, 6e3), velocity=(0, 100, 0), prf=250, n_pulses=40)

@@ -17,10 +17,10 @@ import numpy as np
 
 from ..base import boxes
 from ..opencl.device import Device
-from . import _dispersion
+from . import dispersion
 from ._along_track import along_track, farthest_phase
-from ._current_sums import Paths, current_sums
-from ._currents import Currents
+from .current_sums import Paths, current_sums
+from .currents import Currents
 from .lattice import COURANT
 
 
@@ -63,17 +63,17 @@ def paths_of(currents: Currents, tx: np.ndarray, rx: np.ndarray) -> Paths:
         ray = np.asarray(antenna, float) - currents.centre
         ranges.append(np.linalg.norm(ray, axis=1))
         towards.append(ray / ranges[-1][:, None])
-    omega = _dispersion.grid_omega(currents.lattice, currents.k, towards[0])
-    received = _dispersion.wavenumber(currents.lattice, omega, towards[1])
+    omega = dispersion.grid_omega(currents.lattice, currents.k, towards[0])
+    received = dispersion.wavenumber(currents.lattice, omega, towards[1])
     return Paths(towards[0], ranges[0], towards[1], ranges[1], currents.k, received)
 
 
 def weighted(currents: Currents, paths: Paths, sums: np.ndarray, received: np.ndarray) -> np.ndarray:
     """Echo amplitudes from sums (6, P, F) over cells, in polarisations `received` (Q, P, 3): complex64 (P, Q, F)."""
     grid = currents.lattice
-    vector = _dispersion.grid_vector(grid, paths.received, paths.rx)
-    e, h = _dispersion.fields(vector, received)
+    vector = dispersion.grid_vector(grid, paths.received, paths.rx)
+    e, h = dispersion.fields(vector, received)
     total = np.einsum("qpfa,apf->pqf", np.concatenate([e, h], axis=-1), sums)
-    flux = _dispersion.flux(grid, paths.sent, paths.tx) * _dispersion.flux(grid, paths.received, paths.rx)
+    flux = dispersion.flux(grid, paths.sent, paths.tx) * dispersion.flux(grid, paths.received, paths.rx)
     scale = -paths.sent * grid.cell**2 / (2 * np.sqrt(np.pi) * COURANT) / np.sqrt(flux)
     return np.asarray(scale[:, None] * total, np.complex64)

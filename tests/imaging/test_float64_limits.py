@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.cases import REPEATED, noise_history
-from helpers.precise_cases import decimal_image, error, focus, task_of
+from helpers.float64_cases import decimal_image, error, focus, task_of
 
 import sarcl
 from sarcl.base.constants import SPEED_OF_LIGHT

@@ -19,10 +19,10 @@ from sarcl.cli.parser import main
 from sarcl.fullwave.fields import Fields
 from sarcl.fullwave.lattice import Lattice
 from sarcl.fullwave.target import Target
-from sarcl.opencl import _programs, _trial_record, choose_device, device_list, fft
-from sarcl.opencl import device as device_module
+from sarcl.opencl import _trial_record, choose_device, device_list, fft, programs
 from sarcl.opencl._trial import Outcome
 from sarcl.opencl.choose_device import open_device
+from sarcl.opencl.device import Device, Limits
 from sarcl.opencl.device_list import DeviceInfo
 
 
@@ -291,8 +291,8 @@ def test_a_kernel_of_many_launches_is_told_the_types_of_its_numbers_and_gives_th
     grid, fields = Lattice(0.01, (3, 4, 16), np.zeros(3)), []
     start = np.random.default_rng(1).uniform(-1, 1, (2, 3, *grid.shape))
     for many in (10**9, 3):
-        monkeypatch.setattr(device_module, "MANY_LAUNCHES", many)
-        run = Fields(device_module.Device(device.info, device._raw), grid, Target.nothing())
+        one = Device(device.info, device._raw, Limits(launches=many))
+        run = Fields(one, grid, Target.nothing())
         run.start(*start)
         run.advance(8)
         fields.append(run.download())
@@ -303,7 +303,7 @@ def test_a_kernel_of_many_launches_is_told_the_types_of_its_numbers_and_gives_th
 
 
 def test_includes_are_expanded_once_and_lines_point_at_the_files():
-    text = _programs.source("backproject.cl")
+    text = programs.source("backproject.cl")
     assert "#include" not in text
     assert text.count('#line 1 "doubleword.clh"') == 1
     line = text.split("\n").index(
@@ -330,9 +330,9 @@ def test_programs_are_given_only_the_macros_they_name(device, monkeypatch):
     monkeypatch.setattr(pyopencl, "Program", Program)
     device._build("ray_casting.cl", {"VW": device.info.vector_width, "FP64": 0, "TAPS": 4})
     assert [option for option in given[-1] if option != "-D_OPENCL_H_"] == []
-    assert {"VW", "FP64", "TAPS"} <= _programs.names_in(_programs.source("backproject.cl"))
+    assert {"VW", "FP64", "TAPS"} <= programs.names_in(programs.source("backproject.cl"))
     # tests/visibility runs on no twin of a device: none would change these
-    assert not {"VW", "FP64"} & _programs.names_in(_programs.source("ray_casting.cl"))
+    assert not {"VW", "FP64"} & programs.names_in(programs.source("ray_casting.cl"))
 
 
 # a value of each macro that some program needs
@@ -357,7 +357,7 @@ PROGRAMS = sorted(path.name for path in (Path(__file__).parents[2] / "kernels").
     ids=str,
 )
 def test_pocl_needs_the_short_header_alone(device, monkeypatch, file, other):
-    if device.info.platform != _programs.POCL:
+    if device.info.platform != programs.POCL:
         pytest.skip("not PoCL")
     if not device.info.fp64 and ("float64" in file or "DOUBLE" in other):
         pytest.skip("no float64")
@@ -376,9 +376,9 @@ def test_pocl_needs_the_short_header_alone(device, monkeypatch, file, other):
 
 
 def test_a_version_of_pocl_that_refuses_the_short_header_gets_the_text_alone(device, monkeypatch):
-    monkeypatch.setattr(_programs, "POCL", device.info.platform)
-    whole = _programs.source
-    monkeypatch.setattr(_programs, "source", lambda file: "refused;" if file == "builtins.clh" else whole(file))
+    monkeypatch.setattr(programs, "POCL", device.info.platform)
+    whole = programs.source
+    monkeypatch.setattr(programs, "source", lambda file: "refused;" if file == "builtins.clh" else whole(file))
     assert "hidden" in device._build("ray_casting.cl", {})
 
 

@@ -20,9 +20,9 @@ import numpy as np
 
 from ..lattice import Lattice
 from ._closed_mesh import ClosedMesh, closed_mesh
-from ._cut_cells import Box, FaceAreas, Intervals, nodes_inside
 from ._face_areas import face_areas
 from ._thin_parts import ThinParts
+from .cut_cells import Box, FaceAreas, Intervals, nodes_inside
 
 CANDIDATES = 2**20  # pairs of a facet and a line per array operation: bounds the memory
 TIE = 2  # whole numbers: shorter intervals and gaps are rounding
@@ -33,7 +33,7 @@ SIGNS = ((1, 1), (1, -1), (-1, 1), (-1, -1))  # of e and e^2
 class MeshLines:
     """What the lines of a grid see of closed meshes.
 
-    intervals  along x, y and z, for `_cut_cells.conductor`
+    intervals  along x, y and z, for `cut_cells.conductor`
     areas      of faces across x, y and z, exactly, for the same
     volume     m^3, by the lines along each axis (3,): lengths inside times the area of a cell; a line in the surface
                counts as the mean of its four neighbours

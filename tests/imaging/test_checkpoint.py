@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import io
+import itertools
 import json
 import logging
 import os
@@ -15,6 +16,7 @@ import sys
 import time
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -212,13 +214,18 @@ def test_a_short_run_that_fails_leaves_nothing_unless_asked(raw, tmp_path):
     assert names(tmp_path) == []
 
 
+def pass_between_looks(monkeypatch, seconds):
+    """So many seconds pass each time a checkpoint looks at the clock."""
+    monkeypatch.setattr(checkpoint, "time", SimpleNamespace(monotonic=itertools.count(0, seconds).__next__))
+
+
 def test_an_interrupted_run_keeps_what_is_worth_it(raw, whole, tmp_path, monkeypatch, caplog):
-    monkeypatch.setattr(checkpoint, "PERIOD", 0.0)
+    pass_between_looks(monkeypatch, 2.0)
     options = {"out": tmp_path / "image.h5", "max_bytes": SMALL, "progress": stop_after(raw.n_rows * GRID.size / 2)}
     with pytest.raises(Stopped):
         sarcl.backproject(raw, GRID, **options)
     assert names(tmp_path) == []  # less than a minute of work
-    monkeypatch.setattr(checkpoint, "WORTH", 0.0)
+    pass_between_looks(monkeypatch, 100.0)
     with pytest.raises(Stopped):
         sarcl.backproject(raw, GRID, **options)
     assert len(tiles(tmp_path)) >= 3 and "the same call continues" in caplog.text
@@ -249,7 +256,7 @@ def test_a_full_disk_costs_the_files_but_not_the_image(raw, whole, tmp_path, mon
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(tile_files.TileStore, "save", full)
-    monkeypatch.setattr(checkpoint, "PERIOD", 0.0)
+    pass_between_looks(monkeypatch, 2.0)
     image = sarcl.backproject(raw, GRID, out=tmp_path / "image.h5", max_bytes=SMALL)
     assert np.array_equal(image.data[...], whole.data)
     assert caplog.text.count("finished tiles cannot be kept") == 1 and "No space left" in caplog.text

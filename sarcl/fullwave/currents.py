@@ -9,12 +9,12 @@ from math import ceil, log
 import numpy as np
 
 from ..opencl.device import Device
-from . import _dispersion
-from ._incident import PlaneWave, WaveTable, wave_table
+from . import dispersion
 from ._lists import SAMPLES, TargetList
-from ._pulse import Pulse
 from .fields import BLOCK, PERIODS, Fields
+from .incident import PlaneWave, WaveTable, wave_table
 from .lattice import COURANT, Lattice
+from .pulse import Pulse
 from .target import Target
 
 WEAKEST = 1e-3  # of the spectrum: float32 fields have errors of about 1e-6 of the peak
@@ -67,7 +67,7 @@ def currents(
     low, high, centre = box_of(lattice, absorber, gap)
     _check_inside(lattice, target, low, high)
     table = wave_table(lattice, wave, low, high, centre)
-    omega = _dispersion.grid_omega(lattice, k, wave.travel)
+    omega = dispersion.grid_omega(lattice, k, wave.travel)
     spectrum = table.spectrum(omega)
     _check_band(k, spectrum)
     every = sample_period(wave.pulse, omega, lattice.time_step)

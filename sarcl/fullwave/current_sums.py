@@ -11,7 +11,7 @@ import numpy as np
 from ..opencl.device import Device
 from ..opencl.launch_numbers import launch_numbers
 from ..opencl.memory_budget import budget
-from ._currents import Currents
+from .currents import Currents
 
 BLOCK = 8  # frequencies whose sums a work-item has in registers, as in kernels/current_sums.cl
 CHUNK = 2048  # cells of a work-item: float32 sums over more would lose digits

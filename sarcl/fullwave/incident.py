@@ -13,9 +13,9 @@ import numpy as np
 
 from ..base.constants import SPEED_OF_LIGHT
 from ..base.validation import array, direction, sealed
-from . import _dispersion
-from ._pulse import SILENCE, Pulse
+from . import dispersion
 from .lattice import COURANT, GroupOrder, Lattice
+from .pulse import SILENCE, Pulse
 
 SPACING = 1 / 3  # of the table, in cells: six points interpolate waves of 6 cells to 1e-5
 QUIET = 3e-8  # of the peak of the wave: float32 fields have errors ten times as large
@@ -189,8 +189,8 @@ def wave_table(lattice: Lattice, wave: PlaneWave, low: np.ndarray, high: np.ndar
     line = np.asarray(wave.pulse.spectrum(frequency), np.complex128)
     kept = np.abs(line) > SILENCE * np.abs(line).max()
     omega, line = 2 * np.pi * frequency[kept], line[kept] / np.abs(line[kept]).sum()
-    k = _dispersion.wavenumber(lattice, omega, wave.travel)
-    units = np.concatenate(_dispersion.fields(_dispersion.grid_vector(lattice, k, wave.travel), wave.polarization), 1)
+    k = dispersion.wavenumber(lattice, omega, wave.travel)
+    units = np.concatenate(dispersion.fields(dispersion.grid_vector(lattice, k, wave.travel), wave.polarization), 1)
     signal = (np.exp(1j * np.outer(np.arange(n_steps) * dt - delay, omega)) @ line).real
     return WaveTable(
         lattice, wave, low, high, n_steps, n_points, first, delay, centre, line, omega, k, units.T, signal

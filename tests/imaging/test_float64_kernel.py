@@ -13,7 +13,7 @@ from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.imaging.float64.direct import packed
 from sarcl.imaging.focusing_task import geometry_of
 from sarcl.numerics import error_bounds, interpolation, interpolator_choice
-from sarcl.opencl import _programs, fft
+from sarcl.opencl import fft, programs
 from sarcl.reference.interp import interpolate
 
 # name -> (expression in pairs, twin in Decimal, error bound relative to the result)
@@ -30,7 +30,7 @@ def probe(device, monkeypatch, body, inputs, n_out, header="doubledouble.clh", *
     n = -(-inputs.shape[1] // lanes) * lanes
     padded = np.ones((len(inputs), n))
     padded[:, : inputs.shape[1]] = inputs
-    expanded = _programs.source.__wrapped__
+    expanded = programs.source.__wrapped__
     text = "\n".join(expanded(h) for h in dict.fromkeys(["doubledouble.clh", header])) + (
         "\n__kernel void probe(__global const double *x, __global const double *table, int n, __global double *out) {\n"
         f"    int i = get_global_id(0);\n    {body}\n}}\n"

@@ -1,0 +1,35 @@
+"""Pieces of rough facets in tiles, on the device that cut them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import sarcl
+from sarcl.numerics.tiles import tile_points
+from sarcl.scattering.rough_pieces import RoughFacets, RoughPieces
+from sarcl.scene import triangles as geometry
+from sarcl.simulation._piece_tiling import PieceTiling
+
+
+@pytest.mark.parametrize("per_tile", [64, 256])
+def test_tiles_hold_their_pieces(double, per_tile):
+    axis, cos = np.linspace(-9, 9, 6), sarcl.Material(diagram="cos")
+    x, y = np.meshgrid(axis, axis)
+    one = sarcl.Scene.from_heights(axis, axis, np.sin(x / 3) * np.cos(y / 4), material=cos)
+    one = one + sarcl.Scene.facets(0.1 * np.eye(3)[None], material=cos)  # not cut
+    pieces = RoughPieces.cut(double, one.moved((300.0, -2e3, 7.0)), 0.4, 0)
+    tiling = PieceTiling(pieces, *RoughFacets(pieces).tiling_numbers(np.array([9.6e9]), True, False))
+    tiles = tiling.tiles(per_tile)
+    assert tiling.tiles(per_tile) is tiles
+    wanted, order = tile_points(
+        geometry.centroids(pieces.corners()[0]), tiling.center, per_tile, np.arange(len(pieces))
+    )
+    assert (tiles.n_tiles, tiles.last) == (wanted.n_tiles, per_tile - (len(order) - len(pieces)))
+    assert tiles.last < per_tile
+    references = double.download(tiles.references, np.empty((2, 3, tiles.n_tiles), np.float32)).sum(axis=0, dtype=float)
+    assert np.abs(references.T - wanted.references).max() < 1e-12
+    assert tiling.radius[per_tile] == pytest.approx(wanted.radius.max(), rel=1e-12)
+    offsets = double.download(tiles.offsets, np.empty((6, tiles.n_offsets), np.float32))[:, : len(order)]
+    # positions of 2 km round by 2e-13 m, float32 pairs of offsets in the last of 48 bits
+    assert np.abs(offsets[:3].astype(float) + offsets[3:] - wanted.offsets[:3] - wanted.offsets[3:]).max() < 1e-12
