@@ -5,6 +5,7 @@ For other folders:
     illumination           lit(): sampled shares of facets, per block of pulses; facet_shares(), pixel_shares()
     lit_parts              LitParts: the part of each facet that is lit at every pulse, exactly
     rays                   SceneRays: the first facet on each ray, and whether any lies between two points
+    swept_shadows          never_shaded(): facets on which no shadow falls at any pulse, for certain
 
 For this folder alone:
 
@@ -23,4 +24,4 @@ For this folder alone:
     _viewpoints            which pulses and facets are looked at, for an error between them
 """
 
-__all__ = ["illumination", "lit_parts", "rays"]
+__all__ = ["illumination", "lit_parts", "rays", "swept_shadows"]
