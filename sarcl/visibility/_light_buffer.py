@@ -19,7 +19,7 @@ from ._frame import DeviceSamples, Frame
 
 KERNELS = "light_buffer.cl"
 NEAREST = 1.5  # radii of the scene, from its middle: viewpoints nearer than this see it at angles too wide for a plane
-CELLS, WIDEST = 2**20, 16.0  # cells, of which each occluder has 16 at most, and one at least
+CELLS, WIDEST = 2**20, 8.0  # cells, of which each occluder has 8 at most, and one at least
 FEWEST, MOST = 16, 2048  # cells along a side
 MOST_ENTRIES = 2**25  # occluders in all cells; with more, cells are made larger
 
