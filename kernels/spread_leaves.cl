@@ -6,7 +6,7 @@
 // symbols   a_k   amplitude, |a|^2 = radar cross section, m^2; delta, kappa, sigma as in geometry.clh
 // macros    VW, FP64, BISTATIC, TAPS, TERMS, RANGE, ORDER as in the headers; records with LOCAL
 //           STRIDE  samples of a profile, a multiple of 8; delay 0 stands at STRIDE/2
-// reference: sarcl/reference/echo.py:echo
+// reference: sarcl/reference/equations.py:point_echo
 
 #include "common.clh"
 #include "doubleword.clh"

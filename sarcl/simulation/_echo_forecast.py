@@ -3,7 +3,7 @@
 Where the scene is prepared quickly beside the whole job, it is, and kept for the run: the errors are then those of the
 run, and a few pulses are computed and timed. Else preparing it is a large part of the work. Then errors are the shares
 of the tolerance that the plan allots, which those of the run do not exceed, and seconds follow from the numbers of
-pieces and pulses (numerics/cost_model.py), to about a factor of three.
+pieces and pulses (sarcl/numerics/cost_model.py), to about a factor of three.
 """
 
 from __future__ import annotations

@@ -207,7 +207,7 @@ class LitParts:
         turn = min(span.turn + 1e-6 + (2 * self._margin / away if away else 2.0) * (self._margin > 0), 2.0)
         cosines = [dot(r.normal, unit(at - r.center)) for at in antennas]
         # a facet is not seen from a side that is turned away from an antenna by more than directions change
-        # and between two antennas, one of which may be edge-on to it (scattering/physical_optics.py:lit_share)
+        # and between two antennas, one of which may be edge-on to it (physical_optics.py:lit_share)
         away_by = 2 * turn + (2 * EDGE_ON if len(antennas) == 2 else 0.0)
         front = np.all([c > -away_by for c in cosines], axis=0)
         back = r.two_sided & np.all([c < away_by for c in cosines], axis=0)
