@@ -1,7 +1,7 @@
 """Options of a verb: a frozen record with the type, default, check and documentation of each.
 
-A verb's signature and help (sarcl/base/verb.py), its stub for type checkers, its section in scenario files, its flags on the
-command line and its table in the guide are made from its record.
+A verb's signature and help (sarcl/base/verb.py), its stub for type checkers, its section in scenario files, its flags
+on the command line and its table in the guide are made from its record.
 """
 
 from __future__ import annotations
