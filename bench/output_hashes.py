@@ -243,6 +243,14 @@ table(echo, of_raw, {
     "echo points near": {"track": lambda: circle(radius=60.0, height=40.0, arc=0.3)},
     "echo points blocks": {"scene": lambda: cloud(4000, 40.0), "max_bytes": 2e6},
     "echo points far": {"track": lambda: circle(radius=6e5, height=5e5, arc=1e-3), "tolerance": 1e-4},
+    "echo factorized 1e-02": {"scene": lambda: cloud(4000, 40.0), "track": lambda: circle(200), "method": "factorized"},
+    "echo factorized 1e-04": {
+        "scene": lambda: cloud(4000, 40.0), "track": lambda: circle(200), "method": "factorized", "tolerance": 1e-4,
+    },
+    "echo factorized bistatic": {
+        "scene": lambda: cloud(4000, 40.0), "track": lambda: circle(200), "method": "factorized",
+        "receiver": lambda: circle(200, start=0.1),
+    },
     "echo facets": {"scene": solids, "check": True},
     "echo facets 1e-2": {"scene": solids, "tolerance": 1e-2},
     "echo facets 1e-4": {"scene": solids, "tolerance": 1e-4, "wave": lambda: chirp(bandwidth=100e6)},

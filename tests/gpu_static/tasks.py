@@ -30,7 +30,7 @@ WITHOUT_FP64 = (
     "direct beam",
     "factorized 1e-02", "factorized 1e-03", "factorized bistatic", "factorized points", "echo points 1e",
     "echo points far", "echo points bistatic", "echo antenna pair", "echo facets 1e-4", "echo facets bistatic",
-    "echo terrain tank",
+    "echo terrain tank", "echo factorized",
     "array facets", "beam", "antenna beam", "pixel taper", "spectral_echo", "polar_format", "range_doppler",
 )  # fmt: skip
 # Tasks of which the plan alone is wanted: they end at the first launch of a kernel whose name begins so.
