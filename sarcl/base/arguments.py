@@ -16,7 +16,7 @@ LONGEST_NAME = 4096  # bytes of a path on Linux
 LONGEST_TEXT = 500  # characters of a title: more does not fit on a picture
 
 
-def path(name: str, value: Any) -> Path:
+def path(name: str, value: object) -> Path:
     """`value` as a Path; TypeError for what is no name of a file, ValueError for one that no system takes."""
     if not isinstance(value, (str, os.PathLike)) or isinstance(os.fspath(value), bytes):
         raise TypeError(f"{name} is a {type(value).__name__}; give the name of a file, a string or a pathlib.Path")
@@ -26,7 +26,7 @@ def path(name: str, value: Any) -> Path:
     return made
 
 
-def text(name: str, value: Any) -> str | None:
+def text(name: str, value: object) -> str | None:
     """`value` if it is None or a string of at most LONGEST_TEXT characters."""
     if value is not None and not isinstance(value, str):
         raise TypeError(f"{name} is a {type(value).__name__}; give a string or None")
@@ -35,7 +35,7 @@ def text(name: str, value: Any) -> str | None:
     return value
 
 
-def progress(value: Any, called: str = "progress(stage, done, total)") -> Any:
+def progress(value: object, called: str = "progress(stage, done, total)") -> Any:
     """`value` where it is None or can be called; TypeError otherwise."""
     if value is not None and not callable(value):
         raise TypeError(f"progress is {_shown(value)}; give a function, which is called as {called}, or None")
@@ -71,5 +71,5 @@ def chosen(name: str, value: Any, n: int, what: str) -> np.ndarray:
     return made
 
 
-def _shown(value: Any) -> str:
+def _shown(value: object) -> str:
     return f"{' '.join(repr(value).split()):.60}"

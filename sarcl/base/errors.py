@@ -144,7 +144,7 @@ class ToleranceUnreachable(ValueError):
             return self._remedy
         return f"pass tolerance={tolerance_text(self.best)} or larger"
 
-    def __reduce__(self) -> Any:
+    def __reduce__(self) -> tuple[object, ...]:
         return type(self), (self.asked, self.best, self.limit, self._remedy, self.how), {"where": self.where}
 
     def __str__(self) -> str:

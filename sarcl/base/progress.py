@@ -34,7 +34,7 @@ class Bar:
     def __enter__(self) -> Bar:
         return self
 
-    def __exit__(self, *exc: Any) -> None:
+    def __exit__(self, *exc: object) -> None:
         self.wipe()
 
     def __call__(self, stage: str, done: int, total: int) -> None:

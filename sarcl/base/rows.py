@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 
@@ -12,7 +10,7 @@ def spread_over(n: int, most: int) -> np.ndarray:
     return np.unique(np.linspace(0, n - 1, min(most, n)).astype(int))
 
 
-def groups(n: int, *keys: Any) -> np.ndarray:
+def groups(n: int, *keys: np.ndarray | None) -> np.ndarray:
     """Number of the group of each of n rows, int64 (n,): rows of a group agree in every key, (n,) each, None left out.
 
     Groups are numbered in the order of the first key, then of the second, and so on.

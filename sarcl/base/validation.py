@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, SupportsComplex, SupportsFloat, SupportsIndex
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from .host_memory import installed
 from .text import size_text
@@ -14,7 +15,7 @@ LARGEST_TOLERANCE = 0.3  # relative error; noise of a tenth of the signal's powe
 LEAST_TOLERANCE = 1e-11  # relative error; a range of 1 km at 10 GHz, rounded to float64, has a phase error of 2e-11 rad
 
 
-def array(name: str, value: Any, dtype: Any, shape: tuple[int | str, ...]) -> np.ndarray:
+def array(name: str, value: object, dtype: DTypeLike, shape: tuple[int | str, ...]) -> np.ndarray:
     """Return `value` as a finite array of `dtype` with `shape`; a str in `shape` is a free axis, named.
 
     The result is a read-only copy in C order: the caller's array stays as it is. ValueError names the
@@ -39,14 +40,14 @@ def ndim(name: str, value: Any) -> int:
         raise ValueError(f"{name} is {shown:.60}, whose rows differ in length; give rows of equal length") from None
 
 
-def flag(name: str, value: Any) -> bool:
+def flag(name: str, value: object) -> bool:
     """`value` as True or False; TypeError for anything but these, 1 and 0."""
     if not isinstance(value, (bool, np.bool_, int, np.integer)) or value not in (0, 1):
         raise TypeError(f"{name} is {' '.join(repr(value).split()):.60}; give True or False")
     return bool(value)
 
 
-def flags(name: str, value: Any) -> Any:
+def flags(name: str, value: object) -> Any:
     """`value`, one or several of True, False, 1 and 0; TypeError for anything else, which NumPy may take for True."""
     given = np.asarray(value) if ndim(name, value) else None
     if given is None:
@@ -56,7 +57,7 @@ def flags(name: str, value: Any) -> Any:
     return value
 
 
-def without_unit(name: str, value: Any) -> None:
+def without_unit(name: str, value: object) -> None:
     """ValueError for numbers that carry a unit (astropy, unyt, pint): NumPy would take 1 km for 1."""
     kind = type(value)
     if kind in (float, int, np.ndarray, list, tuple):
@@ -69,7 +70,7 @@ def without_unit(name: str, value: Any) -> None:
             )
 
 
-def values(name: str, value: Any, dtype: Any = np.float64) -> np.ndarray:
+def values(name: str, value: object, dtype: DTypeLike = np.float64) -> np.ndarray:
     """`value` of any shape as an array of `dtype`, NaN and Inf left in it; ValueError for what are no numbers."""
     return np.asarray(value) if type(value) is float else converted(name, value, dtype)
 
@@ -90,7 +91,7 @@ class _NoNumbers(TypeError):
     """Why a value is refused, in words of sarcl."""
 
 
-def converted(name: str, value: Any, dtype: Any) -> np.ndarray:
+def converted(name: str, value: object, dtype: DTypeLike) -> np.ndarray:
     """A copy of `value` as an array of `dtype` in C order; ValueError where that would change its numbers."""
     wanted = np.dtype(dtype)
     ndim(name, value)
@@ -122,7 +123,7 @@ def converted(name: str, value: Any, dtype: Any) -> np.ndarray:
         raise ValueError(f"{name} must be numbers that fit {wanted}, got {shown:.80} ({why})") from None
 
 
-def unmasked(name: str, value: Any, first_row: int = 0, remedy: str = "fill them, with 0 where nothing came") -> Any:
+def unmasked(name: str, value: object, first_row: int = 0, remedy: str = "fill them, with 0 where nothing came") -> Any:
     """`value` without an empty mask; ValueError where values of a masked array are masked: they are no numbers.
 
     first_row  rows are counted from it
@@ -171,7 +172,7 @@ def number(name: str, value: Any, *, above: float | None = None, least: float | 
     return out
 
 
-def tolerance(value: Any) -> float:
+def tolerance(value: object) -> float:
     """`value` as a relative error that an image or echoes may have: LEAST_TOLERANCE to LARGEST_TOLERANCE."""
     out = number("tolerance", value, above=0)
     if out > LARGEST_TOLERANCE:
@@ -203,7 +204,7 @@ def count(name: str, value: Any, least: int | None = 1) -> int:
     return out
 
 
-def direction(name: str, value: Any) -> np.ndarray:
+def direction(name: str, value: object) -> np.ndarray:
     """Return the unit vector along `value` (3,); a zero vector raises."""
     v = array(name, value, np.float64, (3,))
     if not v.any():
@@ -212,13 +213,13 @@ def direction(name: str, value: Any) -> np.ndarray:
     return np.asarray(v / np.linalg.norm(v))
 
 
-def instance(name: str, value: Any, kind: type) -> None:
+def instance(name: str, value: object, kind: type) -> None:
     """Raise TypeError unless `value` is a `kind`."""
     if not isinstance(value, kind):
         raise TypeError(f"{name} is a {type(value).__name__}; wanted a sarcl.{kind.__name__}")
 
 
-def choice(name: str, value: Any, allowed: tuple[str, ...]) -> str:
+def choice(name: str, value: object, allowed: tuple[str, ...]) -> str:
     """Return `value` if it is one of `allowed`."""
     if not isinstance(value, str) or value not in allowed:
         raise ValueError(

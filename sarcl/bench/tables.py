@@ -8,20 +8,7 @@ from . import ratios
 from ._cases import WORDS
 
 Cells = list[list[str]]
-HEAD = [
-    "",
-    "method",
-    "setting",
-    "error",
-    "of |I|",
-    "form s",
-    "median",
-    "call s",
-    "kernel s",
-    "process s",
-    "cpu s",
-    "Gbp/s",
-]
+HEAD = ", method, setting, error, of |I|, form s, median, call s, kernel s, process s, cpu s, Gbp/s".split(", ")
 MATCH_HEAD = ["peer", "its error", "Gbp/s", "sarcl", "error", "Gbp/s", "form", "median form", "call", "process", "cpu"]
 GROWTH_HEAD = ["", "method", "setting", "error at most", "n", "form s", "form", "cpu"]
 EXPLAINED = (

@@ -273,7 +273,7 @@ def _say_report(what: str, report: Report | None, job: Job) -> None:
     logging.getLogger("sarcl").info("%s", report)
 
 
-def _show_warning(message: Warning | str, *rest: Any, **more: Any) -> None:
+def _show_warning(message: Warning | str, *rest: object, **more: object) -> None:
     print(f"sarcl: warning: {message}", file=sys.stderr)
 
 

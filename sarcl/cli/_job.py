@@ -10,12 +10,13 @@ from types import FrameType
 from typing import Any
 
 from ..base.progress import Bar
+from ..base.types import PathLike
 from ..io import formats, output_paths
 
 Outputs = dict[str, tuple[int, int] | None]
 
 
-def identity(path: Any) -> tuple[int, int] | None:
+def identity(path: PathLike) -> tuple[int, int] | None:
     """Inode and time of a file, which change when another file replaces it; None where there is no file."""
     try:
         found = os.stat(path)
@@ -57,7 +58,7 @@ class Job:
             sys.unraisablehook = self._unraisable
         return self
 
-    def __exit__(self, kind: Any, *_: Any) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         self.bar.wipe()
         for number, before in self._before.items():
             signal.signal(number, before)
@@ -82,7 +83,7 @@ class Job:
         self.bar.wipe()
         print(text, flush=True)
 
-    def expect(self, path: Any, n_bytes: int = 0) -> None:
+    def expect(self, path: PathLike, n_bytes: int = 0) -> None:
         """Register an output path of at least n_bytes; raises what `output_paths.check_writable` raises where it cannot
         be written."""
         output_paths.check_writable(path, n_bytes)

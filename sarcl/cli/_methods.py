@@ -55,11 +55,11 @@ class Method:
             options["method"] = args.method
         return cls(name, options)
 
-    def plan(self, raw: PhaseHistory, grid: ImageGrid | None, device: Any) -> Any:
+    def plan(self, raw: PhaseHistory, grid: ImageGrid | None, device: object) -> Any:
         """The Forecast."""
         return verbs.plan(getattr(verbs, self.name), *self._subjects(raw, grid), **self.options, device=device)
 
-    def image(self, raw: PhaseHistory, grid: ImageGrid | None, device: Any, **running: Any) -> Image | None:
+    def image(self, raw: PhaseHistory, grid: ImageGrid | None, device: object, **running: Any) -> Image | None:
         """The image; None for a piece. running: `out`, `progress`, and `tile` and `resume` of backproject."""
         verb = getattr(verbs, self.name)
         image: Image | None = verb(*self._subjects(raw, grid), **self.options, device=device, **running)

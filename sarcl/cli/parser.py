@@ -12,6 +12,7 @@ import re
 import shlex
 import signal
 import sys
+from collections.abc import Callable
 from typing import Any, NoReturn
 
 from ..io import formats
@@ -42,7 +43,7 @@ class _Parser(argparse.ArgumentParser):
         self.exit(BAD_INPUT, f"sarcl: error: {message} (see {self.prog} --help)\n")
 
 
-def _add(group: Any, words: str, text: str, kind: Any = None, **options: Any) -> None:
+def _add(group: Any, words: str, text: str, kind: Callable[[str], object] | None = None, **options: Any) -> None:
     """Add an option: its names and what follows them, as "-o --output PATH", its help, and what a value becomes."""
     names = [word for word in words.split() if word.startswith("-")] or words.split()[:1]
     values = tuple(words.split()[len(names) :])
@@ -142,36 +143,21 @@ def _focus_method(p: argparse.ArgumentParser) -> None:
     """Options of the method."""
     how = p.add_argument_group("focusing")
     default, of_fast = (f"{DEFAULTS[verb]['tolerance']:g}" for verb in ("backproject", "polar_format"))
-    _add(
-        how, "--tolerance", f"relative error allowed (default {default}; polar_format, range_doppler: {of_fast})", float
-    )
-    _add(
-        how,
-        "--method",
+    text = f"relative error allowed (default {default}; polar_format, range_doppler: {of_fast})"
+    _add(how, "--tolerance", text, float)
+    text = (
         "backprojection (default auto: the cheaper of direct and factorized); polar_format: plane wavefronts; "
-        "range_doppler: straight tracks and orbits, by zero-Doppler time and slant range",
-        choices=[*CHOICES["backproject"]["method"], "polar_format", "range_doppler"],
-        default=DEFAULTS["backproject"]["method"],
+        "range_doppler: straight tracks and orbits, by zero-Doppler time and slant range"
     )
+    methods = [*CHOICES["backproject"]["method"], "polar_format", "range_doppler"]
+    _add(how, "--method", text, choices=methods, default=DEFAULTS["backproject"]["method"])
     _flag(how, "--dry-run", "print method, time, memory and error, and focus nothing")
-    _add(
-        how,
-        "--window",
-        "hamming, taylor:SIDELOBE_DB:NBAR such as taylor:35:5, hann, kaiser:8.6 ...; or RANGE,CROSS-RANGE",
-        window,
-    )
-    _add(
-        how,
-        "--beam DEG",
-        "full angle of the transmit beam, pointed at the grid's centre; range_doppler: of the azimuth beam",
-        degrees,
-    )
-    _add(
-        how,
-        "--mapping",
-        "map the echoes of a frequency-diverse array first (docs/guide/fda.md)",
-        choices=CHOICES["backproject"]["mapping"],
-    )
+    text = "hamming, taylor:SIDELOBE_DB:NBAR such as taylor:35:5, hann, kaiser:8.6 ...; or RANGE,CROSS-RANGE"
+    _add(how, "--window", text, window)
+    text = "full angle of the transmit beam, pointed at the grid's centre; range_doppler: of the azimuth beam"
+    _add(how, "--beam DEG", text, degrees)
+    text = "map the echoes of a frequency-diverse array first (docs/guide/fda.md)"
+    _add(how, "--mapping", text, choices=CHOICES["backproject"]["mapping"])
     _flag(how, "--wrap", "repeat ranges outside the unambiguous swath")
     _add(how, "--max-bytes SIZE", "memory for blocks on the device, e.g. 2G", size)
 
@@ -196,12 +182,8 @@ def _focus_pieces(p: argparse.ArgumentParser) -> None:
         "large images", "finished tiles of an IMAGE.h5 wait in IMAGE.h5.parts; --device all uses every device"
     )
     _add(large, "--tile I/N", "make piece I of N alone; the last to finish puts the image together", piece)
-    _add(
-        large,
-        "--resume",
-        "keep finished tiles whatever ends the run (default: when it is killed), or --no-resume: start again",
-        action=argparse.BooleanOptionalAction,
-    )
+    text = "keep finished tiles whatever ends the run (default: when it is killed), or --no-resume: start again"
+    _add(large, "--resume", text, action=argparse.BooleanOptionalAction)
 
 
 def _focus_rows(p: argparse.ArgumentParser) -> None:
@@ -218,12 +200,8 @@ def _picture(p: argparse.ArgumentParser) -> None:
     _add(grey, "--floor-db DB", "black, dB below white (default -50)", float, default=-50.0)
     white = grey.add_mutually_exclusive_group()
     _add(white, "--top-db DB", "white, dB of a unit point in focus", float)
-    _add(
-        white,
-        "--percentile P",
-        "white: this percentile of the scene's pixels (default 99.5; 100: the brightest pixel)",
-        float,
-    )
+    text = "white: this percentile of the scene's pixels (default 99.5; 100: the brightest pixel)"
+    _add(white, "--percentile P", text, float)
 
 
 def _bench(p: argparse.ArgumentParser) -> None:
@@ -250,7 +228,7 @@ def _bench(p: argparse.ArgumentParser) -> None:
 
 
 class _Version(argparse.Action):
-    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> NoReturn:
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> NoReturn:
         from ..base.version import __version__
 
         print(f"sarcl {__version__}")
@@ -282,7 +260,7 @@ def size(text: str) -> float:
     return value
 
 
-def doppler(text: str) -> Any:
+def doppler(text: str) -> str | float:
     """ "geometry", "data", or Hz (Hz/s)."""
     return text if text in ("geometry", "data") else float(text)
 
@@ -303,7 +281,7 @@ def piece(text: str) -> tuple[int, int]:
 
 def main(argv: list[str] | None = None) -> int:
     """Run a command; returns the exit status."""
-    outputs: Any = {}
+    outputs: dict[str, tuple[int, int] | None] = {}
     debug = "--debug" in (sys.argv[1:] if argv is None else argv)
     try:
         args = parser().parse_args(argv)
@@ -331,7 +309,7 @@ def main(argv: list[str] | None = None) -> int:
         return status
 
 
-def _kept(outputs: Any) -> str:
+def _kept(outputs: dict[str, tuple[int, int] | None]) -> str:
     if not outputs:
         return "nothing was written"
     from ._job import complete

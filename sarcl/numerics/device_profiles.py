@@ -5,7 +5,7 @@ Kernels: kernels/range_profiles.cl, before and after an FFT of rows.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,6 +16,10 @@ from ..opencl.fft_batches import Batches
 from . import range_profiles
 from .interpolation import Interpolator
 from .weighted_samples import bound_of_held
+
+if TYPE_CHECKING:
+    from ..opencl.device import Buffer
+
 
 SINGLE = {"REAL64": 0, "FROM64": 0}  # macros of the kernels
 
@@ -42,7 +46,7 @@ class DeviceProfiles:
         self._double = dtype == np.complex128
         self._largest = float(np.abs(sample_weight).max())
         self._sample_weight = sample_weight
-        self._across: Any = None
+        self._across: Buffer | None = None
         self._made: Any = None
         self._batches = Batches(device, length, dtype)
 
@@ -70,7 +74,7 @@ class DeviceProfiles:
         """Weights of rows (n,) as `make` takes them in a buffer."""
         return row_weight.astype(np.float64) if self._double else float_pairs.wide(row_weight)
 
-    def make(self, samples: Any, kind: np.dtype[Any], row_weight: Any, rows: int) -> Any:
+    def make(self, samples: Buffer, kind: np.dtype[Any], row_weight: Buffer, rows: int) -> Buffer:
         """Enqueue the profiles (rows, length + 2 pad) of a block: their buffer, which the next block overwrites.
 
         samples     buffer (rows, n_samples) of `kind`, complex64 or complex128;  row_weight  buffer of `weights`
@@ -107,8 +111,8 @@ class SpreadSamples:
         self.device, self.n_samples, self.interpolator, self.length = device, n_samples, interpolator, length
         self.pad = range_profiles.padding(interpolator)
         self._batches = Batches(device, length, np.complex64) if possible(device, length, np.complex64) else None
-        self._correction: Any = None
-        self._out: Any = None
+        self._correction: Buffer | None = None
+        self._out: Buffer | None = None
 
     @property
     def row_bytes(self) -> float:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from .polynomials import chebyshev
 
@@ -75,7 +76,7 @@ def interpolator_float64(taps: int, oversample: float) -> Interpolator:
 
 
 @functools.lru_cache(maxsize=1024)
-def deconvolved(taps: int, oversample: float, terms: int, dtype: Any = np.float32) -> Interpolator:
+def deconvolved(taps: int, oversample: float, terms: int, dtype: DTypeLike = np.float32) -> Interpolator:
     """The hat (2 taps) or a Kaiser-Bessel kernel, deconvolved: a type-2 nonuniform FFT in range.
 
     The Kaiser-Bessel shape is pi taps (1 - 1/(2 oversample)), the transform's edge at the first alias. Spectra are

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -21,6 +21,10 @@ from ._grid_image import WORK, OnDevice, OnHost
 from .error_bounds import FLOAT32, sum_rounding
 from .interpolation import TERMS, Interpolator, interpolator, lower_bound
 from .plan import LEAST_TOLERANCE
+
+if TYPE_CHECKING:
+    from ..opencl.device import Buffer
+
 
 OVERSAMPLE = (1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0)
 MOST_COUNTED = 2**20  # samples that are counted to find the most in a cell
@@ -270,7 +274,7 @@ class Samples(Protocol):
     row_bytes: float
     held: bool
 
-    def buffer(self, pipeline: Pipeline, start: int, stop: int) -> Any:
+    def buffer(self, pipeline: Pipeline, start: int, stop: int) -> Buffer:
         """Rows start ... stop - 1 in a buffer, which may be the one of the call before."""
 
 
@@ -282,7 +286,7 @@ class Uploaded:
     def __init__(self, device: Device, read: Callable[[int, int], np.ndarray]) -> None:
         self.device, self.read = device, read
 
-    def buffer(self, pipeline: Pipeline, start: int, stop: int) -> Any:
+    def buffer(self, pipeline: Pipeline, start: int, stop: int) -> Buffer:
         """The samples of these rows, uploaded."""
         return self.device.upload(self.read(start, stop))
 

@@ -5,13 +5,17 @@ Kernels: kernels/transposition.cl, before and after an FFT of rows.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..opencl.device import Device
 from ..opencl.fft_batches import Batches
 from ..opencl.launch_numbers import launch_numbers
+
+if TYPE_CHECKING:
+    from ..opencl.device import Buffer
+
 
 ACROSS = 8  # work-items of a group along each axis, as in kernels/transposition.cl
 
@@ -34,12 +38,12 @@ class Transforms:
             device.kernel("transposition.cl", name) for name in ("rows", "columns", "lay")
         )
 
-    def rows(self, array: Any, first: int, count: int) -> None:
+    def rows(self, array: Buffer, first: int, count: int) -> None:
         """Transform rows first ... first + count - 1 of a buffer (..., length)."""
         self.device.run(self._rows, (self.length, count), None, array, first, self._reserved())
         self._batches.transform()
 
-    def columns(self, array: Any, shape: tuple[int, int], first: int, count: int) -> None:
+    def columns(self, array: Buffer, shape: tuple[int, int], first: int, count: int) -> None:
         """Transform columns of a buffer of `shape`, padded with zeros, or folded, to the length.
 
         Longer columns are added up at the same remainders by the length.
@@ -57,7 +61,8 @@ class Transforms:
         self._batches.transform()
 
     def lay(
-        self, out: Any, stride: int, first: int, count: int, weights: tuple[Any, int], origin: int = 0, sign: int = 1
+        self, out: Any, stride: int, first: int, count: int, weights: tuple[Buffer, int], origin: int = 0,
+        sign: int = 1,
     ) -> None:  # fmt: skip
         """The last `count` transforms as columns, from `first` on, of a buffer (n, stride), the array itself perhaps.
 

@@ -61,7 +61,8 @@ class WeightedSamples:
         self.row_bytes = SLOTS * (dtype.itemsize * self.n_samples + 24.0)
         self._across = device.copied(float_pairs.wide(sample_weight))
         self._energies = device.kernel("weighted_samples.cl", "energies", FROM64=0)
-        self._n_rows, self._sums, self._scales = n_rows, None, np.zeros(n_rows)
+        self._n_rows, self._scales = n_rows, np.zeros(n_rows)
+        self._sums: Any = None
 
     def bound(self, samples: np.ndarray, row_weight: np.ndarray) -> float | None:
         """A modulus that no weighted sample of rows (n, n_samples) with weights (n,) exceeds; None: the host's rows.

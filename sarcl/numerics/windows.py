@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -138,7 +138,7 @@ def _parsed(text: str) -> Any:
     return window
 
 
-def _words(window: Any) -> str:
+def _words(window: object) -> str:
     if window is None:
         return "none"
     if is_array(window):
@@ -147,11 +147,11 @@ def _words(window: Any) -> str:
     return " ".join([name, *(f"{p:g}" if np.ndim(p) == 0 else "array" for p in parameters)])
 
 
-def _shown(window: Any) -> str:
+def _shown(window: object) -> str:
     return f"{' '.join(repr(window).split()):.60}"
 
 
-def _name(window: Any) -> tuple[str, tuple[Any, ...]]:
+def _name(window: object) -> tuple[str, tuple[Any, ...]]:
     """Checked (name, parameters) of a window that is no array."""
     if window is None:
         return "none", ()
@@ -214,7 +214,7 @@ def _named(name: str, parameters: tuple[Any, ...], n: int) -> np.ndarray:
         return _of_scipy(function, name, parameters, n)
 
 
-def _of_scipy(function: Any, name: str, parameters: tuple[Any, ...], n: int) -> np.ndarray:
+def _of_scipy(function: Callable[..., np.ndarray], name: str, parameters: tuple[Any, ...], n: int) -> np.ndarray:
     if name in EDGE_TO_EDGE:  # every other of 2 n + 1 samples from edge to edge is the middle of a cell
         return np.asarray(function(2 * n + 1, *parameters, sym=True)[1::2], np.float64)
     if name == "kaiser_bessel_derived" and n % 2:

@@ -8,9 +8,12 @@ from __future__ import annotations
 
 import functools
 from collections import deque
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    import pyopencl
 
 
 class HostArrays:
@@ -20,7 +23,7 @@ class HostArrays:
         self.enqueued = self.ended = 0
         self._waiting: deque[tuple[int, np.ndarray]] = deque()
 
-    def shared(self, context: Any, array: np.ndarray) -> Any:
+    def shared(self, context: pyopencl.Context, array: np.ndarray) -> pyopencl.Buffer:
         """A read-only buffer in the memory of `array`."""
         return _buffer_class()(context, array, self)
 
@@ -46,7 +49,7 @@ def _buffer_class() -> type:
     class SharedBuffer(pyopencl.Buffer):
         """A buffer in the memory of an array; HostArrays hears when Python drops it."""
 
-        def __init__(self, context: Any, array: np.ndarray, arrays: HostArrays) -> None:
+        def __init__(self, context: pyopencl.Context, array: np.ndarray, arrays: HostArrays) -> None:
             flags = pyopencl.mem_flags.READ_ONLY | pyopencl.mem_flags.USE_HOST_PTR
             super().__init__(context, flags, hostbuf=array)
             self.array, self.arrays = array, arrays

@@ -13,7 +13,11 @@ import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import pyopencl
+
 
 LASTS = 0.2  # s of a part
 FIRST = 2.0**20  # steps of the first part of a kernel: milliseconds on a slow GPU
@@ -62,8 +66,8 @@ class Launches:
         self._known: dict[Any, _Known] = {}
 
     def launch(
-        self, kernel: Any, size: tuple[int, ...], group: tuple[int, ...] | None, fixed: frozenset[int], steps: float,
-        enqueue: Enqueue, flush: Callable[[], object],
+        self, kernel: pyopencl.Kernel, size: tuple[int, ...], group: tuple[int, ...] | None, fixed: frozenset[int],
+        steps: float, enqueue: Enqueue, flush: Callable[[], object],
     ) -> None:  # fmt: skip
         """Enqueue a kernel in as many parts as are needed.
 
@@ -100,7 +104,7 @@ def _axis(size: tuple[int, ...], group: tuple[int, ...] | None, fixed: frozenset
     return axis, units[axis]
 
 
-def lasted(event: Any, enqueued: float) -> float:
+def lasted(event: pyopencl.Event, enqueued: float) -> float:
     """Duration, s, of a part that has ended: as the driver says, else the time since it was enqueued."""
     import pyopencl
 

@@ -6,10 +6,14 @@ import ctypes
 import ctypes.util
 import struct
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..base import host_memory
 from ..base.text import first_line
+
+if TYPE_CHECKING:
+    import pyopencl
+
 
 PCI_BUS_INFO = 0x410F  # CL_DEVICE_PCI_BUS_INFO_KHR: domain, bus, device and function
 
@@ -32,7 +36,7 @@ def platforms() -> list[tuple[str, str, list[Any]]]:
     return found
 
 
-def asked(thing: Any, question: str, otherwise: Any = None) -> Any:
+def asked(thing: object, question: str, otherwise: object = None) -> Any:
     """The answer to a question, an attribute of a device or platform; `otherwise` where the driver refuses it."""
     try:
         return getattr(thing, question)
@@ -40,12 +44,12 @@ def asked(thing: Any, question: str, otherwise: Any = None) -> Any:
         return otherwise
 
 
-def text_of(thing: Any, question: str) -> str:
+def text_of(thing: object, question: str) -> str:
     """The answer to a question for a text; "unknown" where there is none."""
     return str(asked(thing, question, "")).replace("\0", "").strip() or "unknown"
 
 
-def facts(handle: Any) -> dict[str, Any]:
+def facts(handle: pyopencl.Device) -> dict[str, Any]:
     """What the driver says of a device, with the least that kernels may rely on where it refuses a question.
 
     Named as the fields of DeviceInfo; warp: 0 where the driver does not say it; why: a question that it must answer and
@@ -81,7 +85,7 @@ def facts(handle: Any) -> dict[str, Any]:
     )
 
 
-def _pci(handle: Any) -> str:
+def _pci(handle: pyopencl.Device) -> str:
     """Bus, device and function of a device on the PCI bus: "41:00.0"; empty where the driver does not tell them."""
     if "cl_khr_pci_bus_info" in str(asked(handle, "extensions", "")).split():
         found = raw_info(handle, PCI_BUS_INFO, 16)
@@ -105,7 +109,7 @@ def _loader() -> str | None:
     return ctypes.util.find_library("OpenCL") or next(map(str, inside), None)
 
 
-def raw_info(handle: Any, question: int, size: int) -> bytes:
+def raw_info(handle: pyopencl.Device, question: int, size: int) -> bytes:
     """Bytes that clGetDeviceInfo answers to a question that pyopencl does not know; none where it refuses."""
     loader = _loader()
     place = asked(handle, "int_ptr")

@@ -10,13 +10,18 @@ import contextlib
 import hashlib
 import time
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ..base import float_pairs
 from ..base.text import first_line, size_text
 from .programs import build, kernels_of, quiet, source
+
+if TYPE_CHECKING:
+    import pyopencl
+    from numpy.typing import DTypeLike
+
 
 FILE = "trial.cl"
 N = 64  # numbers and points of the trial
@@ -101,7 +106,7 @@ def version() -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-def trial(handle: Any, lanes: int, fp64: bool, local_memory: int, max_group: int) -> Outcome:
+def trial(handle: pyopencl.Device, lanes: int, fp64: bool, local_memory: int, max_group: int) -> Outcome:
     """Build and run the trial's kernels on a device as sarcl uses it.
 
     lanes  per work-item;  fp64, local_memory, max_group  as the driver offers them
@@ -134,7 +139,7 @@ def trial(handle: Any, lanes: int, fp64: bool, local_memory: int, max_group: int
     return replace(passed, fp64=not why, why64=why, fast_fp64=fast)
 
 
-def _built(queue: Any, lanes: int, fp64: int) -> dict[str, Any]:
+def _built(queue: pyopencl.CommandQueue, lanes: int, fp64: int) -> dict[str, Any]:
     with quiet():
         program = build(queue.context, source(FILE), [f"-DVW={lanes}", f"-DFP64={fp64}", f"-DNUMBER64={fp64}"])
     return kernels_of(program)
@@ -180,7 +185,7 @@ def _exact_sum(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return total, (a - (total - back)) + (b - back)
 
 
-def _wrong_numbers(queue: Any, kernel: Any, lanes: int) -> str:
+def _wrong_numbers(queue: pyopencl.CommandQueue, kernel: pyopencl.Kernel, lanes: int) -> str:
     """Run `compute`: which of the RESULTS is wrong and by how much, or nothing."""
     import pyopencl
 
@@ -217,7 +222,7 @@ def compared(result: Result, rows: np.ndarray, right: np.ndarray) -> str:
     )
 
 
-def _local_memory(queue: Any, kernel: Any, offered: int, max_group: int) -> tuple[int, str]:
+def _local_memory(queue: pyopencl.CommandQueue, kernel: Any, offered: int, max_group: int) -> tuple[int, str]:
     """Bytes of local memory that the kernel `exchange` runs with, and what it gets wrong with them, or nothing.
 
     A driver may refuse what it offers: half as much is tried then, down to LOCAL_LEAST.
@@ -248,7 +253,7 @@ def _local_memory(queue: Any, kernel: Any, offered: int, max_group: int) -> tupl
     return 0, ""
 
 
-def _rate(queue: Any, kernel: Any, lanes: int, dtype: Any) -> float:
+def _rate(queue: pyopencl.CommandQueue, kernel: pyopencl.Kernel, lanes: int, dtype: DTypeLike) -> float:
     """Multiplications with additions per second in `chains`: the best of three launches of LASTS seconds or more."""
     import pyopencl
 
@@ -272,7 +277,7 @@ def _rate(queue: Any, kernel: Any, lanes: int, dtype: Any) -> float:
         steps *= 4
 
 
-def _warp(handle: Any, kernel: Any) -> int:
+def _warp(handle: pyopencl.Device, kernel: Any) -> int:
     """Work-items that run in step, as the compiler of a kernel says."""
     import pyopencl
 

@@ -63,7 +63,7 @@ def with_float64(device: Device) -> Device:
     return _open(max(able, key=lambda i: (i.rate, -i.index)).index)
 
 
-def _matches(info: DeviceInfo, choice: Any) -> bool:
+def _matches(info: DeviceInfo, choice: object) -> bool:
     text = str(choice).strip().lower()
     if text.isdecimal() or not isinstance(choice, str):
         return info.index == int(text)
@@ -77,7 +77,7 @@ def _listing() -> str:
     return "; ".join(f"{i.index}: {i.name} ({i.platform}{'' if i.works else ': ' + i.why})" for i in infos)
 
 
-def open_devices(choice: Any) -> list[Device]:
+def open_devices(choice: object) -> list[Device]:
     """Open devices for a choice: one as `open_device` takes it, a list of these, or "all" that work.
 
     "all" takes a device that several platforms list once, and the CPU once.
@@ -95,7 +95,7 @@ def open_devices(choice: Any) -> list[Device]:
     return opened
 
 
-def split_choice(choice: Any) -> list[Any]:
+def split_choice(choice: object) -> list[Any]:
     """The single choices in `choice`, each as `open_device` takes it."""
     if choice is None:
         choice = os.environ.get("SARCL_DEVICE") or None

@@ -21,6 +21,7 @@ from .failures import buffer_bytes, explained
 from .programs import build, kernels_of, names_in, quiet, source
 
 if TYPE_CHECKING:
+    import pyopencl
     from pyopencl import Buffer as Buffer  # returned by upload, zeros and empty
 else:
     Buffer = Any  # in annotations alone: pyopencl is loaded with the first device
@@ -72,7 +73,7 @@ class Device:
         self._launches, self._arrays, self._lock = Launches(), HostArrays(), threading.RLock()
         self._last = ""  # kernel that was launched last and the bytes of its buffers, as text: not on CPUs
 
-    def _timed_queue(self, raw: Any) -> Any:
+    def _timed_queue(self, raw: pyopencl.Device) -> pyopencl.CommandQueue:
         """The queue of commands; on devices other than CPUs with a clock for launches, where the driver has one."""
         import pyopencl
 
@@ -95,7 +96,7 @@ class Device:
         """The same device, its kernels built with one lane per work-item, as GPUs run them."""
         return _twin(self, vector_width=1)
 
-    def kernel(self, file: str, name: str, **macros: int) -> Any:
+    def kernel(self, file: str, name: str, **macros: int) -> pyopencl.Kernel:
         """Kernel `name` of kernels/`file`, built once for each set of integer macros."""
         wide = self.info.fp64 and self.info.fast_fp64
         macros = {"VW": self.info.vector_width, "FP64": int(wide), **macros}
@@ -123,7 +124,7 @@ class Device:
         self._fixed |= dict.fromkeys(made.values(), fixed_axes(text))
         return made
 
-    def upload(self, array: np.ndarray) -> Any:
+    def upload(self, array: np.ndarray) -> Buffer:
         """A read-only buffer with the contents of `array`, which must not change while the buffer is used.
 
         On CPUs it shares the array's memory, and the device keeps the array until the kernels that read it have ended.
@@ -138,13 +139,13 @@ class Device:
             memory = pyopencl.mem_flags
             return pyopencl.Buffer(self.context, memory.READ_ONLY | memory.COPY_HOST_PTR, hostbuf=array)
 
-    def copied(self, array: np.ndarray) -> Any:
+    def copied(self, array: np.ndarray) -> Buffer:
         """A buffer with a copy of `array`, which may change at once, and which kernels may write to."""
         buffer = self.empty(array.nbytes)
         self.write(buffer, array)
         return buffer
 
-    def zeros(self, nbytes: int) -> Any:
+    def zeros(self, nbytes: int) -> Buffer:
         """A buffer of `nbytes` zero bytes."""
         import pyopencl
 
@@ -155,7 +156,7 @@ class Device:
             pyopencl.enqueue_fill_buffer(self.queue, buffer, pattern, 0, nbytes)
         return buffer
 
-    def empty(self, nbytes: int) -> Any:
+    def empty(self, nbytes: int) -> Buffer:
         """A buffer of `nbytes` bytes, not initialised."""
         import pyopencl
 
@@ -170,14 +171,14 @@ class Device:
         with explained(self.info, "a copy", values.nbytes):
             pyopencl.enqueue_copy(self.queue, buffer, np.ascontiguousarray(values))
 
-    def another_queue(self) -> Any:
+    def another_queue(self) -> pyopencl.CommandQueue:
         """A queue of commands beside the device's own, for `write_behind`."""
         import pyopencl
 
         with explained(self.info, "a queue"):
             return pyopencl.CommandQueue(self.context, self.queue.device)
 
-    def page_locked(self, queue: Any, nbytes: int) -> np.ndarray:
+    def page_locked(self, queue: pyopencl.CommandQueue, nbytes: int) -> np.ndarray:
         """Memory of the host, uint8 (nbytes,), from which the driver copies without the processor's help."""
         import pyopencl
 
@@ -187,7 +188,7 @@ class Device:
             write, byte = pyopencl.map_flags.WRITE, np.dtype(np.uint8)
             return np.asarray(pyopencl.enqueue_map_buffer(queue, held, write, 0, (nbytes,), byte)[0])
 
-    def write_behind(self, queue: Any, buffer: Any, values: np.ndarray) -> Any:
+    def write_behind(self, queue: pyopencl.CommandQueue, buffer: pyopencl.Buffer, values: np.ndarray) -> pyopencl.Event:
         """Copy `values` into a buffer on a queue of `another_queue`, while the device's own queue goes on.
 
         Returns at once an event that ends with the copy. What is enqueued on the device after this call waits for it.
@@ -201,7 +202,7 @@ class Device:
             pyopencl.enqueue_barrier(self.queue, wait_for=[copied])
             return copied
 
-    def mark(self) -> Any:
+    def mark(self) -> pyopencl.Event:
         """An event that ends with everything enqueued so far, which begins to run now."""
         import pyopencl
 
@@ -210,7 +211,7 @@ class Device:
             self.queue.flush()
             return event
 
-    def wait(self, event: Any) -> None:
+    def wait(self, event: pyopencl.Event) -> None:
         """Wait for an event of `mark`."""
         with explained(self.info, "running"):
             event.wait()
@@ -250,7 +251,7 @@ class Device:
             need = size_text(buffer_bytes(given))
             self._last = f"kernel {kernel.function_name} or those before it, with buffers of {need},"
 
-            def enqueue(size: tuple[int, ...], offset: tuple[int, ...] | None) -> Any:
+            def enqueue(size: tuple[int, ...], offset: tuple[int, ...] | None) -> pyopencl.Event:
                 return kernel(self.queue, size, group, *given, global_offset=offset)
 
             fixed = self._fixed.get(kernel, frozenset(range(len(size))))
@@ -269,7 +270,7 @@ class Device:
         with self._lock:
             self._arrays.finished(enqueued)
 
-    def max_group(self, kernel: Any) -> int:
+    def max_group(self, kernel: pyopencl.Kernel) -> int:
         """Most work-items of `kernel` in one group."""
         import pyopencl
 

@@ -5,10 +5,14 @@ from __future__ import annotations
 import functools
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from . import _after_fork, _cache_folder, _linker, _queries, _trial_record
 from ._trial import Outcome, trial, version
+
+if TYPE_CHECKING:
+    import pyopencl
+
 
 NOT_TRIED = "not tried"
 
@@ -146,7 +150,7 @@ def _alike(info: DeviceInfo, infos: list[DeviceInfo]) -> tuple[str, int, int]:
     return info.name, info.memory, sum((i.name, i.memory) == (info.name, info.memory) for i in before)
 
 
-def _key(info: DeviceInfo, handle: Any) -> str:
+def _key(info: DeviceInfo, handle: pyopencl.Device) -> str:
     """What the result of a trial depends on: the device, the versions of driver and platform, the trial itself, and
     whether PoCL finds a linker."""
     platform = _queries.text_of(_queries.asked(handle, "platform"), "version")

@@ -6,7 +6,7 @@ import atexit
 import functools
 import threading
 import time
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,6 +14,12 @@ from ..base.threads import threads
 from ._launches import LASTS, lasted
 from .device import Device
 from .programs import quiet
+
+if TYPE_CHECKING:
+    from numpy.typing import DTypeLike
+
+    from .device import Buffer
+
 
 # Multiplications with additions, at the speed of a device's trial, in whose time a launch takes a sample on: an FFT
 # waits for memory, so this is many times what it computes. Launches that take longer make the next batches smaller.
@@ -51,13 +57,13 @@ def rows(device: Device | None, data: np.ndarray, *, inverse: bool = False, engi
     return scipy.fft.fft(data, axis=1, workers=threads())
 
 
-def on_device(device: Device, length: int, dtype: Any) -> bool:
+def on_device(device: Device, length: int, dtype: DTypeLike) -> bool:
     """Whether `rows` of this length and complex type are transformed on the device, and not on the host."""
     double = device.info.fp64 and length & (length - 1) == 0
     return not device.is_cpu and (dtype == np.complex64 or double)
 
 
-def in_place(device: Device, buffer: Any, shape: tuple[int, int], dtype: Any) -> None:
+def in_place(device: Device, buffer: Buffer, shape: tuple[int, int], dtype: DTypeLike) -> None:
     """Enqueue the FFT of every row of a buffer of `shape`, complex64 or complex128, not normalised, in its place.
 
     Where `on_device`. The first call for a shape builds programs; a plan holds `temporary_bytes` for each row.
@@ -68,7 +74,7 @@ def in_place(device: Device, buffer: Any, shape: tuple[int, int], dtype: Any) ->
         compiled(rows, rows)
 
 
-def temporary_bytes(length: int, dtype: Any) -> int:
+def temporary_bytes(length: int, dtype: DTypeLike) -> int:
     """Bytes per row, at most, that `in_place` takes on the device beside the row itself."""
     power = 1 << (length - 1).bit_length()
     longest = power if power == length else 2 * power  # other lengths are convolved with a chirp, in powers of two

@@ -4,11 +4,17 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .device import Device
+
+if TYPE_CHECKING:
+    import pyopencl
+
+    from .device import Buffer
+
 
 AHEAD = 1  # steps that may still run when `Pipeline.step` returns, on a device other than a CPU
 SLOTS = AHEAD + 1  # blocks whose uploads are in memory
@@ -30,7 +36,7 @@ class Pipeline:
         self._running: deque[tuple[Any, Callable[[], object]]] = deque()  # steps: an event at the end, and what follows
         self._slots: list[list[_Staged]] = [[] for _ in range(SLOTS)]
         self._turn = self._used = 0
-        self._uploads: Any = None
+        self._uploads: pyopencl.CommandQueue | None = None
 
     @property
     def held(self) -> int:
@@ -40,7 +46,7 @@ class Pipeline:
     def __enter__(self) -> Pipeline:
         return self
 
-    def __exit__(self, kind: Any, *_: Any) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         try:
             if self._uploads is not None:
                 self._uploads.finish()
@@ -54,7 +60,7 @@ class Pipeline:
         """The uploads from here on belong to the next block; those of the block before the last one may be replaced."""
         self._turn, self._used = (self._turn + 1) % SLOTS, 0
 
-    def upload(self, array: np.ndarray) -> Any:
+    def upload(self, array: np.ndarray) -> Buffer:
         """A buffer with the contents of `array`, for kernels of this block.
 
         On CPUs it shares the array's memory, which must live until the end of the step; on others the array may change
@@ -94,12 +100,12 @@ class Pipeline:
 class _Staged:
     """Page-locked memory of the host, and a buffer of the device that is filled from it."""
 
-    def __init__(self, device: Device, queue: Any, nbytes: int) -> None:
+    def __init__(self, device: Device, queue: pyopencl.CommandQueue, nbytes: int) -> None:
         self.device, self.queue, self.nbytes = device, queue, nbytes
         self.host, self.buffer = device.page_locked(queue, nbytes), device.empty(nbytes)
-        self._copy: Any = None
+        self._copy: pyopencl.Event | None = None
 
-    def copied(self, array: np.ndarray) -> Any:
+    def copied(self, array: np.ndarray) -> Buffer:
         """The buffer, which is being filled with `array`: what is enqueued on the device from here on waits for it."""
         staged = self.host[: array.nbytes]
         np.copyto(staged.view(array.dtype).reshape(array.shape), array)

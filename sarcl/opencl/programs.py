@@ -11,9 +11,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..base.text import size_text
+
+if TYPE_CHECKING:
+    import pyopencl
+
 
 POCL = "Portable Computing Language"  # name of PoCL's platform
 _building = threading.RLock()  # the filters of warnings belong to all threads
@@ -49,7 +53,7 @@ def names_in(text: str) -> frozenset[str]:
     return frozenset(re.findall(r"\b[A-Za-z_]\w*", re.sub(r"//.*", "", text)))
 
 
-def build(context: Any, text: str, options: list[str]) -> Any:
+def build(context: pyopencl.Context, text: str, options: list[str]) -> pyopencl.Program:
     """The built program of OpenCL source text; pyopencl.Error where it does not build.
 
     PoCL reads Clang's declarations of every built-in function, 900 kB, for each build, also of a program that it has

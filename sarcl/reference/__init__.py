@@ -8,8 +8,7 @@ For other folders:
 
     backproject    the image equation, term by term
     certain_shadows  shadows that miss a facet, or cover it, whatever antenna of several casts them
-    compress       the matched filter
-    equations      delay, echo, image, field of an array, full-wave updates, waveform forming: in a textbook's order
+    equations      delay, echo, matched filter, image, array, full-wave updates, waveform forming: in a textbook's order
     facet          echo of triangular facets by physical optics
     facet_pieces   pieces of rough facets, and their random numbers
     fdtd           layers, bodies and incident waves of a Yee grid

@@ -46,9 +46,13 @@ def plane_delay(
 
 
 def point_echo(
-    points: np.ndarray, amplitudes: np.ndarray, frequencies: np.ndarray, tx: np.ndarray, rx: np.ndarray,
+    points: np.ndarray,
+    amplitudes: np.ndarray,
+    frequencies: np.ndarray,
+    tx: np.ndarray,
+    rx: np.ndarray,
     reference_range: float,
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """s(f) = sum_k a_k exp(-j 2 pi f (tau_k - tau_ref)) at frequencies, Hz (n,), of one antenna pair: complex128 (n,).
 
     points m (k, 3), amplitudes m (k,), |a|^2 = RCS. Source: Farooq 2009, equation 2.32, of discrete scatterers.
@@ -62,9 +66,14 @@ def point_echo(
 
 
 def conductor_echo(
-    triangle: np.ndarray, frequencies: np.ndarray, tx: np.ndarray, rx: np.ndarray, reference_range: float,
-    nodes: int = 60, up: tuple[float, float, float] = UP,
-) -> np.ndarray:  # fmt: skip
+    triangle: np.ndarray,
+    frequencies: np.ndarray,
+    tx: np.ndarray,
+    rx: np.ndarray,
+    reference_range: float,
+    nodes: int = 60,
+    up: tuple[float, float, float] = UP,
+) -> np.ndarray:
     """s_rt(f) = integral of k/(2 sqrt(pi)) e_r.(2 n x (k_i x e_t)) exp(-j 2 pi f (tau - tau_ref)) dA, m (n_f, 2, 2).
 
     The current 2 n x H of a conducting facet, m (3, 3), in spherical waves; r received, t sent: 0 is H, 1 is V.
@@ -98,6 +107,11 @@ def _legendre(n: int) -> tuple[np.ndarray, np.ndarray]:
     """Gauss-Legendre nodes and weights on [0, 1]."""
     x, w = roots_legendre(n)
     return (x + 1) / 2, w / 2
+
+
+def matched_filter(samples: np.ndarray, pulse: np.ndarray) -> np.ndarray:
+    """Samples (n_rows, n) times the conjugate of a pulse spectrum (n,): complex128. Source: docs/theory/radar.md."""
+    return samples.astype(np.complex128) * np.conj(pulse)
 
 
 # Images
@@ -184,23 +198,24 @@ def update_h(e: np.ndarray, h: np.ndarray, s: float) -> None:
         h[a] -= s * (after(e[c], b) - after(e[b], c))
 
 
-def longer(antenna: np.ndarray, offset: np.ndarray) -> np.ndarray:
-    """|a - y| - |a|, m (P, n), of antennas a (P, 3) and cells y (n, 3), m, both from the target's centre."""
-    away = np.linalg.norm(antenna, axis=1)[:, None]
-    return np.asarray(np.linalg.norm(antenna[:, None] - offset, axis=2) - away)
-
-
 def current_sums(
-    offset: np.ndarray, current: np.ndarray, travel: np.ndarray, sent: np.ndarray, received: np.ndarray,
-    tx: np.ndarray, rx: np.ndarray,
-) -> np.ndarray:  # fmt: skip
+    offset: np.ndarray,
+    current: np.ndarray,
+    travel: np.ndarray,
+    sent: np.ndarray,
+    received: np.ndarray,
+    tx: np.ndarray,
+    rx: np.ndarray,
+) -> np.ndarray:
     """sum_n J_n exp(-j k ((|T - y_n| - |T|) - d.y_n) - j k_r (|R - y_n| - |R|)): waveform forming, complex128 (P, F).
 
     offset, current  cells y from the centre, m (n, 3), and their currents (F, n) in a wave along `travel`, d (3,)
     sent, received   k, rad/m (F,), and k_r (P, F);  tx, rx  T and R from the centre, m (P, 3)
     Source: Zou, Jia and Qiao 2021, equations 4 to 6; docs/theory/waveform_forming.md.
     """
-    out, there, back = np.empty(received.shape, complex), longer(tx, offset) - offset @ travel, longer(rx, offset)
+    there, back = (np.linalg.norm(a[:, None] - offset, axis=2) - np.linalg.norm(a, axis=1)[:, None] for a in (tx, rx))
+    out = np.empty(received.shape, complex)
     for f, values in enumerate(current):
-        out[:, f] = np.exp(-1j * (sent[f] * there + received[:, f, None] * back)) @ values.astype(complex)
+        paths = sent[f] * (there - offset @ travel) + received[:, f, None] * back
+        out[:, f] = np.exp(-1j * paths) @ values.astype(complex)
     return out

@@ -1,4 +1,4 @@
-"""Profiles about a tile's centre, and their decimation, term by term."""
+"""Profiles about a tile's centre, their decimation, and its adjoint, term by term."""
 
 from __future__ import annotations
 
@@ -27,4 +27,29 @@ def merge(
             carrier = raw.frequency[p] + raw.n_samples // 2 * raw.frequency_step[p]
             moved = profile * np.exp(4j * np.pi * carrier / SPEED_OF_LIGHT * delta)
             out[kept : kept + weights.shape[1]] += weights[row + i][:, None] * moved
+    return out
+
+
+def expand(
+    profiles: np.ndarray,
+    offsets: np.ndarray,
+    raw: PhaseHistory,
+    center: np.ndarray,
+    kept: np.ndarray,
+    weights: np.ndarray,
+) -> np.ndarray:
+    """s_p(f) = sum_v W(p - v) sum_m G_v(m) exp(-j 2 pi (f_c tau + (f - f_c)(tau + 2 offset_m/c))), tau of center.
+
+    profiles (n_kept, m): G at `offsets` m (m,) beyond the path to center, without the carrier of these offsets
+    kept (n_rows, taps): pulses v around each row, and weights (n_rows, taps): W
+    raw  gives antennas, reference ranges and frequencies. Returns samples, complex128 (n_rows, n_samples): the adjoint
+    of `merge`.
+    """
+    out = np.empty((raw.n_rows, raw.n_samples), np.complex128)
+    n = np.arange(raw.n_samples) - raw.n_samples // 2
+    for p in range(raw.n_rows):
+        delta = float(half_path(raw.tx[p], raw.rx[p], center[None], raw.reference_range[p])[0])
+        carrier = raw.frequency[p] + raw.n_samples // 2 * raw.frequency_step[p]
+        cycles = carrier * delta + raw.frequency_step[p] * np.outer(n, delta + offsets)
+        out[p] = np.exp(-4j * np.pi / SPEED_OF_LIGHT * cycles) @ (weights[p] @ profiles[kept[p]])
     return out

@@ -18,6 +18,7 @@ from ..scene.scene import Scene
 from ..scene.terrain import Heights, above, check_above, clear_of, facets_on
 from ..visibility.illumination import ALL_DARK, Illumination, lit
 from ..visibility.lit_parts import ON_PLANE, FacetPieces, LitParts
+from ..visibility.swept_shadows import never_shaded
 from .facet_kinds import coherent
 from .facets import FacetSet
 from .random_surface import Pieces
@@ -174,11 +175,19 @@ def _rough_facets_of(
     if shadows is None or casters is None or not casters.hides_any or not keep.any():
         progress("scene", 3, 3)
         return RoughFacets(pieces.within(keep)) if keep.any() else None, left_out
-    cut, of = pieces.cells()
+    pieces = pieces.within(keep)
+    is_lit = casters.never_shade(pieces, antennas)
+    rest = pieces.rows(np.flatnonzero(~is_lit))
+    cut, of = rest.cells()
     report_shadows = partial(progress, "shadows")
-    illumination = casters.light(cut, of, keep[of], antennas, shadows, pieces.device, report_shadows)
-    seen = np.flatnonzero(keep[of] & ~illumination.dark)
-    left_out["shadowed"] = (int(keep[of].sum()) - len(seen)) * n_pulses
+    power = scene.reflectivity[pieces.of] ** 2 * geometry.areas(pieces.facets)
+    illumination = casters.light(
+        cut, of, np.ones(len(of), bool), antennas, shadows, pieces.device, report_shadows, float(power[is_lit].sum())
+    )
+    index = np.flatnonzero(np.repeat(~is_lit, pieces.counts))
+    illumination = illumination.among(index, len(pieces))
+    seen = np.flatnonzero(~illumination.dark)
+    left_out["shadowed"] = (len(pieces) - len(seen)) * n_pulses
     progress("scene", 3, 3)
     return RoughFacets(pieces.picked(seen), illumination, seen) if len(seen) else None, left_out
 
@@ -262,8 +271,11 @@ class Casters:
         rule: ShadowRule,
         device: Device,
         progress: Progress,
+        beside: float = 0.0,
     ) -> Illumination:
         """Shares of pieces of a scene's facets `of` (k,), those `wanted` (k,), that antennas see past these casters.
+
+        beside  power of other pieces, which all antennas see whole
 
         The pieces are without random heights: displaced along their normals they would occlude their neighbours.
         """
@@ -277,12 +289,22 @@ class Casters:
             tolerance=min(FINEST[0], FINEST[1] * rule.accuracy),
             accuracy=rule.accuracy,
             weights=pieces.reflectivity**2 * geometry.areas(pieces.triangles),
+            beside=beside,
             max_bytes=rule.max_bytes,
             occluders=self.solid,
             ground=ground,
             device=device,
             progress=progress,
         )
+
+    def never_shade(self, pieces: RoughPieces, antennas: PulseGeometry) -> np.ndarray:
+        """Facets of pieces (k,) that are certain to be seen whole by all antennas: of the terrain, which these stand
+        on."""
+        is_lit = (self.on_heights & ~self.hidden_by_floor)[pieces.of]
+        rows = np.flatnonzero(is_lit)
+        two_sided = pieces.scene.two_sided[pieces.of[rows]]
+        is_lit[rows] = never_shaded(pieces.facets[rows], two_sided, self.solid, antennas.ends)
+        return is_lit
 
     def _pieces_hidden_by_floor(self, pieces: Scene, of: np.ndarray, antennas: PulseGeometry) -> np.ndarray:
         """Pieces of facets `of` (k,) that the terrain may hide (k,): of a wall, those near the ground alone."""

@@ -165,7 +165,7 @@ class Builder:
         return {k: tuple(v) if isinstance(v, list) else v for k, v in {**table, **options}.items()}
 
 
-def _stand(part: Scene, ground: Scene | None, place: Any) -> Scene:
+def _stand(part: Scene, ground: Scene | None, place: object) -> Scene:
     """`part` placed on the earlier parts of the scenario, at place = [x, y] or [x, y, depth], m."""
     if ground is None:
         raise ValueError("on has no ground: put the table of the ground before this one")

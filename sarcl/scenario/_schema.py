@@ -153,7 +153,7 @@ class Where:
             raise kind(f"{self.text(path, named)} {exc}") from exc
 
 
-def check_section(section: str, table: Any, where: Where) -> None:
+def check_section(section: str, table: object, where: Where) -> None:
     """Check keys and types of a section. ValueError names the line of an unknown key, a missing key or a wrong type."""
     known = calls(section)
     if section == "materials" and isinstance(table, Mapping):
@@ -198,7 +198,7 @@ def check_choices(given: Collection[str], where: Where) -> None:
         )
 
 
-def tables_of(section: str, kind: str, value: Any) -> list[tuple[Path, Any]]:
+def tables_of(section: str, kind: str, value: object) -> list[tuple[Path, Any]]:
     """Each table of a kind with its path: a scene may hold several tables of one kind."""
     if section == "scene" and isinstance(value, list):
         return [((section, kind, i), part) for i, part in enumerate(value)]
@@ -229,7 +229,7 @@ def _check_table(
             raise ValueError(f"{where.text(path)} lacks the key {key!r}; it needs {', '.join(needed)}")
 
 
-def _wanted(parameter: inspect.Parameter, value: Any, key: str) -> str:
+def _wanted(parameter: inspect.Parameter, value: object, key: str) -> str:
     """The type that the annotation asks for, in words, where `value` has another; else ""."""
     if key == RENAMED["mesh"]:
         names = {"str"}
@@ -245,11 +245,11 @@ def _wanted(parameter: inspect.Parameter, value: Any, key: str) -> str:
     return "" if good else "a number, a string, true, false or an array"
 
 
-def _is_table(value: Any) -> bool:
+def _is_table(value: object) -> bool:
     return isinstance(value, Mapping) or (isinstance(value, list) and any(isinstance(v, Mapping) for v in value))
 
 
-def _shown(value: Any) -> str:
+def _shown(value: object) -> str:
     if isinstance(value, Mapping):
         return "a table"
     if isinstance(value, bool):

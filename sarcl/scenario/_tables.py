@@ -119,7 +119,7 @@ def named(scene: Scene) -> dict[str, Material]:
     return names
 
 
-def look_up(key: str, value: Any, materials: Mapping[str, Material]) -> Any:
+def look_up(key: str, value: object, materials: Mapping[str, Material]) -> Any:
     """A value of a scene's table, with names of materials replaced by the Materials where the key takes these."""
     if key not in ("material", "materials"):
         return value
@@ -161,5 +161,5 @@ def _scene(value: Scene) -> dict[str, Any]:
     return tables
 
 
-def _without_none(value: Any, names: tuple[str, ...]) -> dict[str, Any]:
+def _without_none(value: object, names: tuple[str, ...]) -> dict[str, Any]:
     return {n: getattr(value, n) for n in names if getattr(value, n) is not None}

@@ -172,14 +172,17 @@ def clear_of(grid: Heights, triangles: np.ndarray, on: np.ndarray, ends: list[np
 def facets_on(grid: Heights, triangles: np.ndarray) -> np.ndarray | None:
     """True (k,) for facets, m (k, 3, 3), that lie on a terrain; None where these are not all of it."""
     x, y, z = grid
+    surface = geometry.of_grid(np.stack([*np.meshgrid(x, y), z], axis=-1))
+    n = len(surface) if np.array_equal(triangles[: len(surface)], surface) else 0  # as Scene.from_heights begins
     size = max(x[-1] - x[0], y[-1] - y[0], np.ptp(z))
-    corners = triangles.reshape(-1, 3).copy()
+    corners = triangles[n:].reshape(-1, 3).copy()
     # corners outside the border by rounding lie on it
     for axis, ends in enumerate((x, y)):
         near = np.clip(corners[:, axis], ends[0], ends[-1])
         corners[:, axis] = np.where(np.abs(near - corners[:, axis]) <= ON * size, near, corners[:, axis])
-    is_on = np.asarray((np.abs(above(grid, corners)) <= ON * size).reshape(-1, 3).all(axis=1))
-    area = geometry.areas(geometry.of_grid(np.stack([*np.meshgrid(x, y), z], axis=-1))).sum()
+    is_on = np.ones(len(triangles), bool)
+    is_on[n:] = (np.abs(above(grid, corners)) <= ON * size).reshape(-1, 3).all(axis=1)
+    area = geometry.areas(surface).sum()
     return is_on if abs(geometry.areas(triangles[is_on]).sum() - area) <= 1e-6 * area else None
 
 

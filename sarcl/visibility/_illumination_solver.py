@@ -93,22 +93,20 @@ class IlluminationSolver:
         levels, partly, halves = np.zeros(self.facets.size, np.uint8), [], []
         by_rays = [np.zeros(0, bool)]
         most = self._more.count * PER_LINE // 2
+        level_of = np.rint(255 * np.sqrt(np.arange(2 * most + 1) / np.float32(2 * most))).astype(np.uint8)
         both = list(range(len(viewpoints)))
         for index, hiders in self._chunks(some):
             rays = any(hider.by_rays(at) for hider in hiders for at in viewpoints)
             if rays and some is None and self._more is not self._few:
                 # rays of more lines only where few tell that a facet is partly seen. By each antenna: facets that both
                 # see a little of are not dark because few samples say so
-                each = [
-                    self._count(index, hiders, self._few, viewpoints, [i], slack).sum(axis=1, dtype=np.int32)
-                    for i in both
-                ]
+                each = [_totals(self._count(index, hiders, self._few, viewpoints, [i], slack)) for i in both]
                 whole = np.min(each, axis=0) == PER_LINE * self._few.count
                 levels[index[whole]] = 255
                 index = index[(np.min(each, axis=0) > 0) & ~whole]
             seen = self._count(index, hiders, self._more, viewpoints, both, slack)
-            total = seen.sum(axis=1, dtype=np.int32)
-            levels[index] = np.rint(255 * np.sqrt(total / np.float32(2 * most)))
+            total = _totals(seen)
+            levels[index] = level_of[total]
             between = (total > 0) & (total < 2 * most)
             partly.append(index[between])
             halves.append(seen[between])
@@ -152,3 +150,8 @@ class IlluminationSolver:
                 hider.hide(samples, viewpoints[i], viewpoints[-1 - i])
         device.run(count, (n,), None, samples.words, seen)
         return device.download(seen, np.empty((n, 2), np.uint16))
+
+
+def _totals(halves: np.ndarray) -> np.ndarray:
+    """Samples on even and odd lines together, int32 (n,), of both (n, 2)."""
+    return np.asarray(halves[:, 0] + halves[:, 1].astype(np.int32))

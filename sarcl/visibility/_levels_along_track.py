@@ -119,10 +119,13 @@ class Looks:
 
 
 class Judge:
-    """Squares of errors of levels, with weights (k,), relative to the weighed sum of their squares: means of looks."""
+    """Squares of errors of levels, with weights (k,), relative to the weighed sum of their squares: means of looks.
 
-    def __init__(self, weights: np.ndarray) -> None:
-        self.weights, self._rate = weights, 0.0
+    beside  what others add to that sum, which are always seen whole
+    """
+
+    def __init__(self, weights: np.ndarray, beside: float) -> None:
+        self.weights, self._beside, self._rate = weights, beside, 0.0
         self._power = weights.astype(np.float32)
         self._sampling: list[float] = []
         self._whole: list[float] = []
@@ -145,7 +148,7 @@ class Judge:
 
     def note(self, look: Look, partial: PartialLook | None) -> None:
         """Note the norm of a look, and its sampling error: of facets that were left out as in the last whole look."""
-        self._whole.append(float(self._power @ SQUARES[look.levels]))
+        self._whole.append(float(self._power @ SQUARES[look.levels]) + self._beside)
         partly = float(self.weights[look.partly].sum())
         off = look.spread(self.weights) + ROUNDED * partly
         if partial is None or not self._rate:

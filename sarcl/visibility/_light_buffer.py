@@ -19,7 +19,7 @@ from ._frame import DeviceSamples, Frame
 
 KERNELS = "light_buffer.cl"
 NEAREST = 1.5  # radii of the scene, from its middle: viewpoints nearer than this see it at angles too wide for a plane
-CELLS, WIDEST = 2**20, 16.0  # cells, of which each occluder has 16 at most, and one at least
+CELLS, WIDEST = 2**20, 8.0  # cells, of which each occluder has 8 at most, and one at least
 FEWEST, MOST = 16, 2048  # cells along a side
 MOST_ENTRIES = 2**25  # occluders in all cells; with more, cells are made larger
 
@@ -73,7 +73,8 @@ class LightBuffer:
         self.device.run(self.device.kernel(KERNELS, kernel), (n,), None, numbers, *buffers)
 
 
-def sees_from_outside(frame: Frame, bounds: np.ndarray, viewpoint: np.ndarray) -> bool:
-    """Whether a viewpoint, m (3,), is far enough from all that is seen, (2, 3) in units of the frame."""
+def sees_from_outside(frame: Frame, radius: float, viewpoint: np.ndarray) -> bool:
+    """Whether a viewpoint, m (3,), is far enough from all that is seen, up to `radius` from the frame's center, in its
+    units."""
     at = (np.asarray(viewpoint, np.float64) - frame.center) * frame.unit
-    return float(np.linalg.norm(at)) > NEAREST * float(np.linalg.norm(corners_of_box(bounds), axis=1).max())
+    return float(np.sqrt(at @ at)) > NEAREST * radius

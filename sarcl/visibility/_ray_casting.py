@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..base.boxes import box
+from ..base.boxes import box, corners
 from ..opencl.device import Device
 from ._box_tree import BoxTree
 from ._frame import DeviceSamples, Frame
@@ -23,6 +23,7 @@ class Occluders:
         self.device, self.frame, self._few = device, frame, FEW * n < len(triangles)
         self._corners = ((triangles - frame.center) * frame.unit).astype(np.float32).reshape(-1, 9)
         self._bounds = box(self._corners.reshape(-1, 3)).astype(np.float64)
+        self._radius = float(np.linalg.norm(corners(self._bounds), axis=1).max())
         self._uploaded: object = None
         self._tree: BoxTree | None = None
         self._views: list[tuple[np.ndarray, LightBuffer]] = []
@@ -38,12 +39,12 @@ class Occluders:
             return
         if self._tree is None:
             self._tree = BoxTree(self.device, self._corners.reshape(-1, 3, 3))
-        outside = sees_from_outside(self.frame, self._bounds, viewpoint)
+        outside = sees_from_outside(self.frame, self._radius, viewpoint)
         self._tree.hide(samples, viewpoint, other, outside)
 
     def by_rays(self, viewpoint: np.ndarray) -> bool:
         """Whether rays through a tree tell what a viewpoint, m (3,), sees."""
-        return self._few or not sees_from_outside(self.frame, self._bounds, viewpoint)
+        return self._few or not sees_from_outside(self.frame, self._radius, viewpoint)
 
     def _buffer(self, viewpoint: np.ndarray) -> LightBuffer:
         """The light buffer of a viewpoint; the last two are kept."""

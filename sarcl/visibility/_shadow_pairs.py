@@ -122,10 +122,10 @@ def _overlapping(
         if sum(counts) <= MOST_ENTRIES or (size >= most - least).all():
             break
         size = 1.5 * size
-    in_cell, occluder = _entries(*occluders, least, most, size)
+    in_cell, occluder = cells_of_boxes(*occluders, least, most, size)
     order = np.argsort(in_cell, kind="stable")
     in_cell, occluder = in_cell[order], occluder[order]
-    cell, receiver = _entries(receivers[0][inside], receivers[1][inside], least, most, size)
+    cell, receiver = cells_of_boxes(receivers[0][inside], receivers[1][inside], least, most, size)
     begin, end = np.searchsorted(in_cell, cell, "left"), np.searchsorted(in_cell, cell, "right")
     is_overlap = end > begin
     cell, receiver, begin, end = cell[is_overlap], inside[receiver[is_overlap]], begin[is_overlap], end[is_overlap]
@@ -155,7 +155,7 @@ def _cells(
     return first, np.floor((np.clip(high, least, most) - least) / size).astype(np.int64) - first + 1
 
 
-def _entries(
+def cells_of_boxes(
     low: np.ndarray, high: np.ndarray, least: np.ndarray, most: np.ndarray, size: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Number of the cell, and index of the box, of every cell that boxes reach over (n,)."""

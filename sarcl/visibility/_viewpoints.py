@@ -125,7 +125,7 @@ class _Refinement:
         if which.kept is None or which.doubtful is None:
             return self.look(middle, None), which
         even = between_levels(first, last, part)
-        drawn = _some_of(which.doubtful)
+        drawn = drawn_of(which.doubtful)
         looked = which.kept | drawn
         found = self.look(middle, PartialLook(a, b, part, looked, even, np.zeros_like(looked)))
         some = np.flatnonzero(drawn)
@@ -157,7 +157,7 @@ def between_levels(first: np.ndarray, last: np.ndarray, part: float) -> np.ndarr
     return out
 
 
-def _some_of(facets: np.ndarray) -> np.ndarray:
+def drawn_of(facets: np.ndarray) -> np.ndarray:
     """One in DRAWN of facets (k,) bool, drawn by their numbers; all of them where they are few."""
     if np.count_nonzero(facets) < FEW:
         return facets

@@ -27,6 +27,7 @@ from ._illumination_solver import IlluminationSolver
 from ._levels_along_track import SAMPLING, Course, Judge, Looks, look_along
 from ._lit_shares import facet_shares as facet_shares
 from ._lit_shares import pixel_shares as pixel_shares
+from ._viewpoints import drawn_of
 
 # Looks that are taken in any case: shadows move by two COARSE widths of a facet at most from one to the next, so that
 # none crosses a facet unseen. Up to COARSEST times fewer where they were more looks at a facet than MUCH
@@ -196,6 +197,24 @@ class Illumination:
                 constant, start = level, pulses[i]
         yield Span(start, n, constant, constant)
 
+    def among(self, index: np.ndarray, k: int) -> Illumination:
+        """The illumination of k facets, of which these are those of an index (n,) and all others are seen whole."""
+
+        def filled(values: np.ndarray, other: int) -> np.ndarray:
+            out = np.full(k, other, values.dtype)
+            out[index] = values
+            return out
+
+        return replace(
+            self,
+            dark=sealed(filled(self.dark, False)),
+            full=sealed(filled(self.full, True)),
+            changing=sealed(filled(self.changing, False)),
+            _usual=sealed(filled(self._usual, 255)),
+            _changes=[(index[some], level) for some, level in self._changes],
+            _look=lambda block: filled(self._look(block), 255),
+        )
+
     def between(self, first: int, stop: int) -> Illumination:
         """The illumination of pulses first ... stop - 1 of the window alone."""
         return replace(self, window=(self.window[0] + first, self.window[0] + stop))
@@ -214,6 +233,7 @@ def lit(
     tolerance: float = 0.25,
     accuracy: float = 0.02,
     weights: np.ndarray | None = None,
+    beside: float = 0.0,
     max_bytes: float | None = None,
     occluders: np.ndarray | None = None,
     ground: tuple[np.ndarray, np.ndarray] | None = None,
@@ -230,6 +250,7 @@ def lit(
     accuracy    error of the amplitudes, roots of the shares, relative to their norm: more samples and pulses are taken
                 until it is met, or there are no more; `error` says what was met. See docs/theory/shadows.md
     weights     powers of the facets (k,) in that norm; default their areas
+    beside      power, in the same unit, of other facets that every pulse sees whole: the norm is of these too
     max_bytes   memory for the shares, default a quarter of that for blocks of `echo`; shares beyond it are computed
                 anew each time they are asked for
     occluders   m (n, 3, 3): what occludes, from both sides; default the facets
@@ -267,12 +288,13 @@ def lit(
     )
     power = np.asarray(areas(triangles) if weights is None else weights, np.float64)
     power = power * (1.0 if wanted is None else wanted)
-    bounds = box_of(triangles) if ground is None else box_of(triangles, ground[0])
+    casters = [part for part in (occluders, None if ground is None else ground[0]) if part is not None]
+    bounds = box_of(triangles, *casters)
     shadows = _MovingShadows.of(triangles, bounds, ends)
-    course, viewpoints, errors = _within(accuracy, tolerance, solver, shadows, power, max_bytes, progress)
+    course, viewpoints, errors = _within(accuracy, tolerance, solver, shadows, power, beside, max_bytes, progress)
     blocks = blocks_around(viewpoints, len(tx))
     n_wanted = k if wanted is None else int(np.sum(wanted))
-    if not course.ever.any() and n_wanted:
+    if not course.ever.any() and n_wanted and not beside:
         warn(ALL_DARK)
     log.info(
         "%d pulses in %d blocks; %d of %d facets never illuminated", len(tx), len(blocks), k - course.ever.sum(), k
@@ -314,15 +336,16 @@ def _within(
     solver: IlluminationSolver,
     shadows: _MovingShadows,
     power: np.ndarray,
+    beside: float,
     max_bytes: float,
     progress: Callable[[int, int], object] | None,
 ) -> tuple[Course, np.ndarray, tuple[float, float, float]]:
     """Looks with an error of at most `accuracy`, or as many as there are; their pulses (n,); and errors: of sampling,
     of motion, and the accuracy that could have been asked for.
 
-    power  of the facets (k,)
+    power  of the facets (k,);  beside  of others that are seen whole
     """
-    judge, lines, finer, ends = Judge(power), 0, 1.0, shadows.ends
+    judge, lines, finer, ends = Judge(power, beside), 0, 1.0, shadows.ends
     n_pulses = len(ends[0])
     _, coarse, _ = shadows.blocks(COARSE)
     thinned = float(np.clip(len(coarse) * len(power) / MUCH, 1, COARSEST))
@@ -337,9 +360,11 @@ def _within(
             n = int(np.ceil(max(len(coarse) / thinned, len(offered) / STRIDE)))
             first = first[np.unique(np.linspace(0, len(first) - 1, n + 1).round().astype(int))][1:-1]
         looks = Looks(solver, [end[offered] for end in ends], slack)
-        lines = lines or judge.lines(looks.whole(len(offered) // 2), SAMPLING * accuracy)
+        if not lines:  # a look at some facets tells how many lines all of them need
+            drawn = drawn_of(np.ones(len(power), bool))
+            lines = judge.lines(looks.whole(len(offered) // 2, drawn), SAMPLING * accuracy)
         solver.take_lines(lines)
-        judge = Judge(power)
+        judge = Judge(power, beside)
         course = look_along(looks, offered, first, judge, accuracy, max_bytes, progress)
         viewpoints = offered[course.chosen]
         sampling, motion = judge.sampling, judge.motion(viewpoints, course.left)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 import sarcl
-from sarcl.reference.compress import compress as exact_compress
+from sarcl.reference.equations import matched_filter
 from sarcl.reference.equations import point_echo as exact_echo
 from sarcl.reference.geometry import half_path
 
@@ -228,7 +228,7 @@ def compress(draw: Draw) -> None:
     found = sarcl.compress(raw, pulse)
     for p in range(n):
         f = raw.frequency[p] + raw.frequency_step[p] * np.arange(n_samples)
-        wanted = exact_compress(np.asarray(raw.samples[p : p + 1]), pulse.pulse_spectrum(f))[0]
+        wanted = matched_filter(np.asarray(raw.samples[p : p + 1]), pulse.pulse_spectrum(f))[0]
         near(np.asarray(found.samples[p]), wanted, 1e-6, what="compressed row")
 
 

@@ -43,7 +43,7 @@ class Bins:
         each = 8 * (self.plan.profile_length + 2 * self.pad) + (8 + 20 / SEGMENT) * (widest + SEGMENT)
         if each > budget:
             raise MemoryError(
-                f"max_bytes leaves {size_text(budget)}, but a Doppler bin needs {size_text(each)}; raise it"
+                f"max_bytes leaves {size_text(budget)}, but a Doppler bin needs {size_text(each)}; raise max_bytes"
             )
         # a few MB at a time stay in the caches of a CPU
         return max(1, int(min(budget, 2**25) // each))

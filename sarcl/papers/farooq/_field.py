@@ -124,9 +124,6 @@ def _orders(out: Section, level: np.ndarray, distance: np.ndarray, azimuth: np.n
     for degrees in (-45, 0, 45):
         near = np.where(np.abs(azimuth - np.radians(degrees)) < 0.02, level, 0)
         places.append(float(distance.flat[int(near.argmax())] - middle))
-    out.states(
-        "brightest place at -45, 0, 45 deg, 2 ns",
-        places,
-        places[0] > 0.05 > abs(places[1]) and places[2] < -0.05,
-        measured=", ".join(f"{1e2 * p:+.1f} cm" for p in places),
-    )
+    measured = ", ".join(f"{1e2 * p:+.1f} cm" for p in places)
+    holds = places[0] > 0.05 > abs(places[1]) and places[2] < -0.05
+    out.states("brightest place at -45, 0, 45 deg, 2 ns", places, holds, measured=measured)

@@ -94,14 +94,9 @@ def ambiguities(lab: Lab) -> Section:
     out.states("first nulls of both without Doppler", nulls, abs(nulls[0] - nulls[1]) < 0.03)
     out.say()
     for name, a, figure in (("LFM", chirp, "4.6"), ("FDA", tones, "4.7")):
-        out.picture(
-            "Modulus of the ambiguity function",
-            decibels(a.magnitude.T, -80),
-            (1e9 * a.delays[0], 1e9 * a.delays[-1]),
-            (a.dopplers[0] / 1e9, a.dopplers[-1] / 1e9),
-            floor_db=-30,
-            words={"name": name, "figure": figure},
-        )
+        ends = (1e9 * a.delays[0], 1e9 * a.delays[-1]), (a.dopplers[0] / 1e9, a.dopplers[-1] / 1e9)
+        out.words = {"name": name, "figure": figure}
+        out.picture("Modulus of the ambiguity function", decibels(a.magnitude.T, -80), *ends, floor_db=-30)
     out.plot("Without Doppler", [(name, 1e9 * tones.delays, c) for name, c in cuts])
     return out
 

@@ -37,12 +37,8 @@ def section(lab: Lab) -> Section:
     out.say()
     out.draw(*figures)
     for figure, (way, response) in zip(("2.15", "2.16"), curves.items(), strict=True):
-        out.plot(
-            "Cut through the centre point along {way}",
-            [(name, places, values / values.max()) for name, (places, values) in response.items()],
-            way=way,
-            figure=figure,
-        )
+        cuts = [(name, places, values / values.max()) for name, (places, values) in response.items()]
+        out.plot("Cut through the centre point along {way}", cuts, way=way, figure=figure)
         out.keep(**{f"{way} {name}": {"m": places[::4], "modulus": v[::4]} for name, (places, v) in response.items()})
     return out
 

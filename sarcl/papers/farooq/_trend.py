@@ -69,12 +69,9 @@ def abstract(lab: Lab) -> Section:
         growth = 10 ** (lengths[two] / 20) - 1
         saved = 100 * (1 - 1 / (1 + growth))
         out.states("collection time reduced", saved, abs(saved - 33) < 1, longer=100 * growth, ratio=1 + growth)
-        out.states(
-            "cross-range resolution, by the same system's aperture",
-            [lengths[two], lengths[one]],
-            abs(lengths[two] - 4.5) < 0.1,
-            growth=100 * (10 ** (lengths[one] / 20) - 1),
-        )
+        longer = 100 * (10 ** (lengths[one] / 20) - 1)
+        item, value = "cross-range resolution, by the same system's aperture", [lengths[two], lengths[one]]
+        out.states(item, value, abs(lengths[two] - 4.5) < 0.1, growth=longer)
         out.states("cross-range resolution, by the same system's nulls", gains[two], abs(gains[two] - 4.5) < 0.1)
     out.say()
     out.table("Gains by frequency step", table)

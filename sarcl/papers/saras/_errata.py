@@ -53,13 +53,8 @@ def _phase_of_a_facet(out: Section) -> None:
     )
     sums = {sign: np.exp(sign * 2j * (rho @ k)).mean() for sign in (1, -1)}
     phases = {sign: float(np.angle(value)) for sign, value in sums.items()}
-    out.states(
-        "phase of a triangle's integral about its centroid",
-        list(phases.values()),
-        abs(phases[1] - phases[-1]) < 0.05,
-        minus=phases[-1],
-        plus=phases[1],
-    )
+    plus, minus = phases.values()
+    out.states("phase of a triangle's integral about its centroid", [plus, minus], abs(plus - minus) < 0.05)
 
 
 def _transfer_function(out: Section) -> None:
@@ -71,9 +66,6 @@ def _transfer_function(out: Section) -> None:
         return complex((beam * np.exp(-1j * (A2 * (1 + EPS * eta / (2 * B2)) * x**2 + XI * x))).sum())
 
     change = XI**2 / (4 * A2) * (1 / (1 + EPS * BAND_EDGE / (2 * B2)) - 1)
-    out.number(
-        "range-azimuth coupling at the edge of the band, xi 60",
-        float(np.angle(transformed(BAND_EDGE) / transformed(0.0))),
-        expected=-change,
-        change=change,
-    )
+    measured = float(np.angle(transformed(BAND_EDGE) / transformed(0.0)))
+    item = "range-azimuth coupling at the edge of the band, xi 60"
+    out.number(item, measured, expected=-change, change=change)

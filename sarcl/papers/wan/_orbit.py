@@ -68,14 +68,9 @@ def section(lab: Lab) -> Section:
     out.keep(incidence_deg=float(np.degrees(seen.incidence)), doppler_rate_hz_per_s=rate, range_doppler_error=apart)
     out.say(incidence_deg=np.degrees(seen.incidence), rate=rate, width=2 * SCALE * FOOT[0])
     half = SCALE * SIDES[0], SCALE * SIDES[1]
-    out.picture(
-        "Backprojected on the ground",
-        _db(power),
-        (-half[1], half[1]),
-        (-half[0], half[0]),
-        **LOOK,
-        words={"looks": LOOKS[lab.quick]},
-    )
+    out.words = {"looks": LOOKS[lab.quick], "averaged": AVERAGED, "alike": ALIKE, "n_averaged": AVERAGED**2}
+    ends = (-half[1], half[1]), (-half[0], half[0])
+    out.picture("Backprojected on the ground", _db(power), *ends, **LOOK)
     rows = np.abs(local[:, local.shape[1] // 2, 1]) < half[0]
     columns = np.abs(local[local.shape[0] // 2, :, 0]) < half[1]
     image = np.abs(np.asarray(first.data)[rows][:, columns]) ** 2
@@ -107,14 +102,8 @@ def _maps_of_cells(
     for key, cells in (("on the ground", ground_map), ("in the slant plane", slant_map)):
         out.picture(f"Power of the facets in cells {key}", _db(cells), ends[1], ends[0], **LOOK)
     alike, unlike = (correlation(image, cells, AVERAGED) for cells in (slant_map, ground_map))
-    out.states(
-        "range-Doppler image and the map of the slant plane",
-        [alike, unlike],
-        alike > max(ALIKE, unlike),
-        averaged=AVERAGED,
-        alike=ALIKE,
-        n_averaged=AVERAGED**2,
-    )
+    holds = alike > max(ALIKE, unlike)
+    out.states("range-Doppler image and the map of the slant plane", [alike, unlike], holds)
 
 
 def _edges(places: np.ndarray) -> np.ndarray:

@@ -46,12 +46,6 @@ def section(lab: Lab) -> Section:
     out.plot(
         "Phases of the image's resolution cells", [*phases, ("uniform", phases[0][1], np.full(16, 1 / (2 * np.pi)))]
     )
-    out.say(
-        few_facets=curves[1][0],
-        few_contrast=few.contrast,
-        many_facets=curves[0][0],
-        many_contrast=many.contrast,
-        few_difference=few.difference,
-        many_difference=many.difference,
-    )
+    (many_facets, *_), (few_facets, *_) = curves
+    out.say(few=few, many=many, few_facets=few_facets, many_facets=many_facets)
     return out

@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from ...numerics import cost_model, range_profiles
 from ...numerics.device_profiles import SpreadSamples
 from ...numerics.pulse_geometry import PulseGeometry
 from ...numerics.tile_constants import TileConstants
-from ...opencl.device import Device
+from ...opencl.device import Buffer, Device
 from ...opencl.launch_numbers import launch_numbers
 from ..spreading import Counts, most_pulses
 from ._levels import FactorizedPlan
@@ -29,7 +28,7 @@ SPAN, GROUP_SPAN, GROUP = 512, 256, 64  # samples that a work-group of a CPU add
 class Pulses:
     """Records of pulses on a device, as kernels/geometry.clh reads them: n of them with padding, n_used without."""
 
-    buffer: Any
+    buffer: Buffer
     n: int
     n_used: int
 
@@ -50,8 +49,8 @@ class Target:
     """
 
     pulses: Pulses
-    centers: Any
-    profiles: Any
+    centers: Buffer
+    profiles: Buffer
     first: int
     stride: int
     origin: int
@@ -67,8 +66,8 @@ class _Join:
     n_larger: int
     parents: np.ndarray
     children: np.ndarray
-    parents_on_device: Any
-    children_on_device: Any
+    parents_on_device: Buffer
+    children_on_device: Buffer
 
     @classmethod
     def of(cls, device: Device, larger: CellLevel | None, cells: CellLevel) -> _Join:
@@ -95,7 +94,7 @@ class FactorizedSpreader:
     antennas: PulseGeometry
     n_samples: int
     budget: float
-    _whole: Any = field(default=None, init=False)
+    _whole: Buffer | None = field(default=None, init=False)
 
     def __len__(self) -> int:
         return len(self.cells)
@@ -133,7 +132,7 @@ class FactorizedSpreader:
                 on_progress(len(self.cells) * pairs // n_cells)
         return Counts(len(self.cells) * len(pulses))
 
-    def _profiles(self, cells: tuple[int, int]) -> Any:
+    def _profiles(self, cells: tuple[int, int]) -> Buffer:
         """Profiles of the largest cells (first, stop)."""
         if cells != (0, len(self.plan.levels[0].cells)):
             return self._ascent.profiles(0, *cells)
@@ -182,7 +181,7 @@ class _Ascent:
         moves = 4 * (4 + self.plan.between.taps) * n_pulses
         return 8.0 * planned.stride * len(planned.decimation.kept) + moves
 
-    def profiles(self, level: int, low: int, high: int) -> Any:
+    def profiles(self, level: int, low: int, high: int) -> Buffer:
         """Profiles of cells low ... high - 1 of a level: a buffer (high - low, kept pulses, stride, 2)."""
         levels = self.plan.levels
         if level == len(levels) - 1:
@@ -198,7 +197,7 @@ class _Ascent:
             self._expand(below, self.profiles(below, first, last), (first, last), target)
         return out
 
-    def rows(self, profiles: Any, roots: tuple[int, int], pulses: range) -> Any:
+    def rows(self, profiles: Buffer, roots: tuple[int, int], pulses: range) -> Buffer:
         """Profiles of pulses about their reference range, of the largest cells (first, stop): a buffer as
         `SpreadSamples.of` takes it."""
         spreader, stride = self.spreader, self.stride
@@ -209,7 +208,7 @@ class _Ascent:
         self._expand(0, profiles, roots, target)
         return out
 
-    def _spread(self, low: int, high: int) -> Any:
+    def _spread(self, low: int, high: int) -> Buffer:
         """Profiles of the smallest cells low ... high - 1."""
         device, leaf, pulses = self.device, self.plan.levels[-1], self.pulses[-1]
         n_cells, references = len(leaf.cells), self.centers[-1]
@@ -222,7 +221,7 @@ class _Ascent:
         device.finish()
         return out
 
-    def _expand(self, level: int, profiles: Any, cells: tuple[int, int], target: Target) -> None:
+    def _expand(self, level: int, profiles: Buffer, cells: tuple[int, int], target: Target) -> None:
         """Add profiles of cells (first, stop) of a level to those of a target."""
         device, plan, (first, last), join = self.device, self.plan, cells, self.joins[level]
         planned, pulses, taps = plan.levels[level], target.pulses, plan.between.taps

@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -52,7 +51,7 @@ class PointPlan:
         """Relative error: the larger one, since each is relative to its own points."""
         return max(plan.predicted_error for plan in self.plans)
 
-    def describe(self) -> dict[str, Any]:
+    def describe(self) -> dict[str, object]:
         """The plan of most points, in words and numbers."""
         return self.plans[0].describe("spread")
 
