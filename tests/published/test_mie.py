@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from helpers.devices import opened, variants
 from helpers.far_field import amplitude
+from helpers.fdtd_cases import sphere_intervals
 
 from sarcl import shapes
 from sarcl.base.constants import SPEED_OF_LIGHT
@@ -14,7 +15,7 @@ from sarcl.fullwave.bodies.materials import Body, bodies
 from sarcl.fullwave.bodies.mesh_lines import mesh_lines
 from sarcl.fullwave.currents import currents
 from sarcl.fullwave.incident import PlaneWave
-from sarcl.fullwave.lattice import lattice_around, sphere_intervals
+from sarcl.fullwave.lattice import lattice_around
 from sarcl.fullwave.pulse import Pulse
 from sarcl.fullwave.target import material_edges
 from sarcl.reference.mie import conducting_sphere, dielectric_sphere

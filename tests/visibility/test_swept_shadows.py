@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 import shapely
 import trimesh
+from helpers.cases import planned_within
+from helpers.lit_cases import lit_polygon
 
 import sarcl
 from sarcl.scattering import scatterers
 from sarcl.scene.triangles import areas, of_grid
 from sarcl.visibility.swept_shadows import never_shaded
-from tests.helpers.lit_cases import lit_polygon
 
 ROUGH = sarcl.Material(diagram="cos")
 
@@ -106,11 +107,11 @@ def test_echoes_are_those_of_looks_at_all_pieces(bistatic, monkeypatch):
     track, receiver = (
         sarcl.Trajectory.circle(radius=7e3, height=5e3, start=start, arc=0.05, n_pulses=16) for start in (0.3, 0.9)
     )
-    monkeypatch.setattr(scatterers, "FEW_LOOKS", 0)
     chirp = sarcl.Waveform.chirp(center=9.6e9, bandwidth=300e6, duration=1e-6)
 
     def echo():
-        return sarcl.echo(scene, chirp, track, receiver=receiver if bistatic else None, tolerance=1e-2, seed=3)
+        options = {"receiver": receiver if bistatic else None, "tolerance": 1e-2, "seed": 3}
+        return planned_within({"few_looks": 0}, sarcl.echo, scene, chirp, track, **options).run()
 
     sorted_out, number = echo(), []
     real = scatterers.never_shaded
