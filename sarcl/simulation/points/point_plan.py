@@ -114,6 +114,8 @@ class PreparedPoints:
             return f"the track has {len(antennas)} pulses, and {FEWEST_PULSES} are the fewest that are decimated"
         if not forced and pairs < cost_model.SEARCH_PAYS:
             return "planning would take longer than it saves"
+        if not forced and not self.device.is_cpu and len(antennas) < cost_model.PULSES_BESIDE_CELLS:
+            return "the GPU adds these pulses before the host has made cells"
         seen = points_in_window(self._cells, antennas)
         numbers, cells = self._cells.order, self._cells
         if not seen.all():
