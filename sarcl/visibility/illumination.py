@@ -272,10 +272,7 @@ def lit(
     tolerance, accuracy = number("tolerance", tolerance, above=0), number("accuracy", accuracy, above=0)
     wanted = None if wanted is None else _mask("wanted", wanted, k)
     two_sided = _mask("two_sided", two_sided, k)
-    if weights is not None:
-        weights = array("weights", weights, np.float64, (k,)) if k else np.zeros(0)
-        if weights.min(initial=0.0) < 0:
-            raise ValueError(f"weights[{weights.argmin()}] is {weights.min():g}; give powers, 0 or more")
+    power = _powers(weights, triangles) * (1.0 if wanted is None else wanted)
     if ground is not None:
         ground = array("ground[0]", ground[0], np.float64, ("n", 3, 3)), _mask("ground[1]", ground[1], k)
     opened = open_device(device)
@@ -286,8 +283,6 @@ def lit(
     solver = IlluminationSolver(
         opened, triangles, two_sided=two_sided, wanted=wanted, occluders=occluders, ground=ground
     )
-    power = np.asarray(areas(triangles) if weights is None else weights, np.float64)
-    power = power * (1.0 if wanted is None else wanted)
     casters = [part for part in (occluders, None if ground is None else ground[0]) if part is not None]
     bounds = box_of(triangles, *casters)
     shadows = _MovingShadows.of(triangles, bounds, ends)
@@ -304,6 +299,16 @@ def lit(
         sealed(n_wanted - np.array(course.seen, np.int64)), (0, len(tx)), *errors,
         sealed(course.usual), course.changes, lambda block: course.looks.again(course.chosen[block]),
     )  # fmt: skip
+
+
+def _powers(weights: np.ndarray | None, triangles: np.ndarray) -> np.ndarray:
+    """Powers of facets, (k,), default their areas; ValueError for negative ones."""
+    if weights is None:
+        return np.asarray(areas(triangles), np.float64)
+    powers = array("weights", weights, np.float64, (len(triangles),)) if len(triangles) else np.zeros(0)
+    if powers.min(initial=0.0) < 0:
+        raise ValueError(f"weights[{powers.argmin()}] is {powers.min():g}; give powers, 0 or more")
+    return powers
 
 
 @dataclass(frozen=True, eq=False)
