@@ -31,10 +31,18 @@ def run(args: argparse.Namespace, outputs: Outputs) -> int:
     """Run the command in `args`; `outputs` gets what each output path is before the work."""
     logging.basicConfig(level=logging.INFO if args.verbose else logging.WARNING, format="sarcl: %(message)s")
     warnings.showwarning = _show_warning
-    commands = (devices, demo, simulate, focus, measure, fda, papers, bench)
-    command = {function.__name__: function for function in commands}[args.command]
+    commands = {
+        "devices": devices,
+        "demo": demo,
+        "simulate": simulate,
+        "focus": focus,
+        "measure": measure,
+        "fda": fda,
+        "papers": papers,
+        "bench": bench,
+    }
     with Job(outputs) as job:
-        return command(args, job)
+        return commands[args.command](args, job)
 
 
 def devices(args: argparse.Namespace, job: Job) -> int:

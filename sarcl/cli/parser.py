@@ -30,7 +30,6 @@ environment: SARCL_DEVICE (default of --device), SARCL_THREADS (threads of CPU d
 exit status: 0 done, 1 something failed, 2 bad input, 3 no working OpenCL device, 130 interrupted,
 143 ended by SIGTERM."""
 
-IMAGES = formats.suggested(formats.writing("picture", "image"))  # endings of files that images are written to
 FAILED, BAD_INPUT, NO_DEVICE, INTERRUPTED, ENDED = 1, 2, 3, 130, 143
 
 
@@ -54,6 +53,11 @@ def _add(group: Any, words: str, text: str, kind: Callable[[str], object] | None
     if kind is not None:
         options["type"] = kind
     group.add_argument(*names, help=text, **options)
+
+
+def _image_endings() -> str:
+    """Endings of files that images are written to."""
+    return formats.suggested(formats.writing("picture", "image"))
 
 
 def _flag(group: Any, words: str, text: str) -> None:
@@ -107,7 +111,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 def _simulate(p: argparse.ArgumentParser) -> None:
-    images = f"focus too and write {IMAGES}; repeatable (default, where there is a grid: FILE.png)"
+    images = f"focus too and write {_image_endings()}; repeatable (default, where there is a grid: FILE.png)"
     _add(p, "scenario FILE.toml", "scenario, see docs/guide/scenarios.md")
     _add(p, "-o --output RAW.h5", "echoes (default: the scenario's name with _raw.h5, here)")
     _add(p, "--image IMAGE", images, action="append", default=[])
@@ -117,7 +121,7 @@ def _simulate(p: argparse.ArgumentParser) -> None:
 
 
 def _focus(p: argparse.ArgumentParser) -> None:
-    images = f"image to write, {IMAGES}; repeatable (default: RAW's name with .png, here)"
+    images = f"image to write, {_image_endings()}; repeatable (default: RAW's name with .png, here)"
     _add(p, "raw RAW", f"{formats.readable('or')}; several are joined", nargs="+")
     _add(p, "-o --output IMAGE", images, action="append", default=[])
     _focus_grid(p)

@@ -36,7 +36,9 @@ def tables(text: str, name: str) -> dict[str, Any]:
         raise too_deep(name) from None
     except ValueError:  # of an integer with more digits than Python reads
         long = re.search(rf"\d{{{sys.get_int_max_str_digits()}}}", text.replace("_", ""))
-        line = text.replace("_", "")[: long.start()].count("\n") + 1 if long else 1
+        if long is None:
+            raise
+        line = text.replace("_", "")[: long.start()].count("\n") + 1
         raise ValueError(f"{name}:{line}: an integer has thousands of digits; write it as a float, as 1e6") from None
 
 

@@ -247,7 +247,7 @@ def test_an_image_shows_and_saves_its_picture(tmp_path):
     image = sarcl.Image(data, grid)
     image.save(tmp_path / "a.png", title="a")
     with Image.open(tmp_path / "a.png") as saved:
-        assert saved.format == "PNG" and saved.size == image._picture(-50, title="a").size
+        assert saved.format == "PNG" and saved.size == image.show(title="a").size
         assert saved.text["Title"] == "a" and saved.text["Software"] == f"sarcl {sarcl.__version__}"
         assert saved.text["Description"] == image.show().info["caption"]
         assert float(saved.text["top_db"]) == pytest.approx(20 * np.log10(23)) and saved.text["floor_db"] == "-50.0"
