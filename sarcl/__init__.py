@@ -37,9 +37,11 @@ def _public_names() -> dict[str, tuple[str, str]]:
         ) from None
     return {
         alias.asname or alias.name: (f".{node.module or ''}", alias.name)
-        for node in stub.body if isinstance(node, ast.ImportFrom)
-        for alias in node.names if alias.name != "__version__"
-    }  # fmt: skip
+        for node in stub.body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+        if alias.name != "__version__"
+    }
 
 
 _PUBLIC = _public_names()

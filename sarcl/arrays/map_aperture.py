@@ -97,9 +97,14 @@ def map_aperture(
 
 
 def _apparent(
-    raw: PhaseHistory, array: AntennaArray, pulse: np.ndarray, step: np.ndarray, towards: np.ndarray, up: np.ndarray,
+    raw: PhaseHistory,
+    array: AntennaArray,
+    pulse: np.ndarray,
+    step: np.ndarray,
+    towards: np.ndarray,
+    up: np.ndarray,
     halved: bool,
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """Vectors from apparent positions to the point, m (n, 3): along the gradient of r + g kappa, of that length.
 
     kappa is the sine of the angle from the array's broadside, g = d f0/df; Farooq's elements lie at -n d y.

@@ -72,9 +72,14 @@ class ToleranceMissed(ValueError):
     """
 
     def __init__(
-        self, tolerance: float, measured: float, image: Image | None = None, raw: PhaseHistory | None = None,
-        predicted: float | None = None, instead: str = "",
-    ) -> None:  # fmt: skip
+        self,
+        tolerance: float,
+        measured: float,
+        image: Image | None = None,
+        raw: PhaseHistory | None = None,
+        predicted: float | None = None,
+        instead: str = "",
+    ) -> None:
         kept = "the image is kept: in its file, or in this error's .image"
         if raw is not None:
             kept = "the echoes are kept: in their file, or in this error's .raw"

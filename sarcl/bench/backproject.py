@@ -81,10 +81,12 @@ class Setting:
 
 
 def run(
-    *, say: Callable[[str], None] = lambda text: None,
+    *,
+    say: Callable[[str], None] = lambda text: None,
     progress: Callable[[str, int, int], None] = lambda stage, done, total: None,
-    keep: Callable[[Document], None] = lambda document: None, **options: Any,
-) -> Document:  # fmt: skip
+    keep: Callable[[Document], None] = lambda document: None,
+    **options: Any,
+) -> Document:
     """Measure; returns a document ready for JSON.
 
     say, progress  lines of text; progress(stage, done, total);  keep(document) is called after every case
@@ -111,9 +113,14 @@ def run(
                 lines = _run_sarcl.competitors(case, folder, opened, setting.methods, setting.tolerances)
                 others = _others(case, folder, peer, setting) if setting.with_peers else []
                 rows = measure(
-                    case, alternate(lines, others), repeats=setting.repeats, limit=setting.limit, paces=paces,
-                    patience=setting.patience, tick=functools.partial(progress, "bench"),
-                )  # fmt: skip
+                    case,
+                    alternate(lines, others),
+                    repeats=setting.repeats,
+                    limit=setting.limit,
+                    paces=paces,
+                    patience=setting.patience,
+                    tick=functools.partial(progress, "bench"),
+                )
                 result = {"scene": case.scene, "data": case.data, "n": case.n, "pairs": case.pairs}
                 norm = float(np.linalg.norm(case.wanted)) / case.norm
                 document["cases"].append({**result, "pixels": setting.pixels, "norm": norm, "rows": rows})

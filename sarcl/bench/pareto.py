@@ -99,9 +99,14 @@ def _label(axes: Axes, case: ratios.Result, styles: dict[str, dict[str, Any]]) -
                 continue
             for shift in sides:
                 annotation = axes.annotate(
-                    text, (row["error"], ratios.rate(case, row)), (0, shift), textcoords="offset points",
-                    ha="center", fontsize=8, color=styles[label]["color"],
-                )  # fmt: skip
+                    text,
+                    (row["error"], ratios.rate(case, row)),
+                    (0, shift),
+                    textcoords="offset points",
+                    ha="center",
+                    fontsize=8,
+                    color=styles[label]["color"],
+                )
                 box = annotation.get_window_extent()
                 if not any(box.overlaps(other) for other in taken):
                     taken.append(box)

@@ -52,9 +52,10 @@ def _unchanged(lattice: Lattice, target: Target, axis: int) -> bool:
     return all(
         _alike(at, values, _image(lattice, at, axis, magnetic=magnetic), mirrored)
         for at, values, mirrored, magnetic in (
-            (target.edges, target.share, target.share, False), (faces, weight, swapped, True)
+            (target.edges, target.share, target.share, False),
+            (faces, weight, swapped, True),
         )
-    )  # fmt: skip
+    )
 
 
 def _alike(at: np.ndarray, values: np.ndarray, other_at: np.ndarray, other: np.ndarray) -> bool:

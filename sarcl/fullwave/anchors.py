@@ -48,9 +48,13 @@ class Anchored:
 
 
 def anchored(
-    formed: Callable[[int], np.ndarray], along: np.ndarray, *, anchors: str | int | np.ndarray = "auto",
-    tolerance: float = 3e-2, mirror: np.ndarray | None = None,
-) -> Anchored:  # fmt: skip
+    formed: Callable[[int], np.ndarray],
+    along: np.ndarray,
+    *,
+    anchors: str | int | np.ndarray = "auto",
+    tolerance: float = 3e-2,
+    mirror: np.ndarray | None = None,
+) -> Anchored:
     """Echoes of P pulses to a tolerance.
 
     formed     formed(pulse): the echoes of all pulses that the currents of an anchor at this pulse form (P, Q, F)

@@ -60,9 +60,12 @@ def current_sums(device: Device, currents: Currents, paths: Paths, *, max_bytes:
     reach = max((float(np.linalg.norm(offset, axis=1).max()) for _, offset, _ in lists if len(offset)), default=0.0)
     group = GROUP if device.info.vector_width == 1 and device.shares(PATHS, GROUP) else 0
     kernel = device.kernel(
-        "current_sums.cl", "current_sums", BISTATIC=int(paths.bistatic), LINEAR=int(_is_linear(paths, reach)),
+        "current_sums.cl",
+        "current_sums",
+        BISTATIC=int(paths.bistatic),
+        LINEAR=int(_is_linear(paths, reach)),
         GROUP=group,
-    )  # fmt: skip
+    )
     lanes, blocks = max(group, 1) * device.info.vector_width, -(-n_frequencies // BLOCK)
     for first in range(0, n_pulses, PULSES):
         part = paths.part(np.arange(first, min(first + PULSES, n_pulses)))

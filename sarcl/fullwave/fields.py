@@ -146,10 +146,14 @@ class Fields:
             for first, last in entrance.spans(planes) if loud != SILENT else ():
                 if first < last:
                     self.device.run(
-                        self._enter, (last - first,), None,
+                        self._enter,
+                        (last - first,),
+                        None,
                         launch_numbers("fdtd_lists.cl", "incident", first=first, **enters),
-                        field, *entrance.arrays, self._wave_values,
-                    )  # fmt: skip
+                        field,
+                        *entrance.arrays,
+                        self._wave_values,
+                    )
             self._correct(part, sample, part.span(planes), magnetic)
         if not magnetic:
             self._add_coupled(sample, self._coupled.span(planes))

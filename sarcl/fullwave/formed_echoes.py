@@ -25,9 +25,14 @@ from .lattice import COURANT
 
 
 def formed_echoes(
-    device: Device, currents: Currents, tx: np.ndarray, rx: np.ndarray, received: np.ndarray, *,
+    device: Device,
+    currents: Currents,
+    tx: np.ndarray,
+    rx: np.ndarray,
+    received: np.ndarray,
+    *,
     max_bytes: float | None = None,
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """Echo amplitudes, m, whose phase is that of `sarcl.echo` about the centre of the currents: complex64 (P, Q, F).
 
     tx, rx    positions of the antennas, m (P, 3)

@@ -192,6 +192,4 @@ def wave_table(lattice: Lattice, wave: PlaneWave, low: np.ndarray, high: np.ndar
     k = dispersion.wavenumber(lattice, omega, wave.travel)
     units = np.concatenate(dispersion.fields(dispersion.grid_vector(lattice, k, wave.travel), wave.polarization), 1)
     signal = (np.exp(1j * np.outer(np.arange(n_steps) * dt - delay, omega)) @ line).real
-    return WaveTable(
-        lattice, wave, low, high, n_steps, n_points, first, delay, centre, line, omega, k, units.T, signal
-    )  # fmt: skip
+    return WaveTable(lattice, wave, low, high, n_steps, n_points, first, delay, centre, line, omega, k, units.T, signal)

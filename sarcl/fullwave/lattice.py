@@ -46,8 +46,11 @@ class Lattice:
         plane = (ny + 1) * row
         made = {
             "origin": array("origin", self.origin, np.float64, (3,)),
-            "row": row, "plane": plane, "component": LANES + (nx + 2) * plane + row, "start": LANES + plane + row,
-        }  # fmt: skip
+            "row": row,
+            "plane": plane,
+            "component": LANES + (nx + 2) * plane + row,
+            "start": LANES + plane + row,
+        }
         for name, value in made.items():
             object.__setattr__(self, name, value)
         if 3 * self.component >= 2**31:

@@ -163,9 +163,14 @@ class Antenna:
 
     @classmethod
     def gaussian(
-        cls, *, width: ArrayLike, gain_db: float = 0.0, two_way: bool = False, frequency: float | None = None,
+        cls,
+        *,
+        width: ArrayLike,
+        gain_db: float = 0.0,
+        two_way: bool = False,
+        frequency: float | None = None,
         mount: ArrayLike = LEVEL,
-    ) -> Antenna:  # fmt: skip
+    ) -> Antenna:
         """Power exp(-4 ln 2 ((a/width_y)^2 + (e/width_z)^2)), rad, where (a, e) is the angle from boresight times the
         unit vector of (y, z): azimuth and elevation on the axes."""
         return cls(kind="gaussian", width=width, gain_db=gain_db, two_way=two_way, frequency=frequency, mount=mount)

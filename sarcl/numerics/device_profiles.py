@@ -37,9 +37,13 @@ class DeviceProfiles:
     """
 
     def __init__(
-        self, device: Device, sample_weight: np.ndarray, length: int, pad: int,
+        self,
+        device: Device,
+        sample_weight: np.ndarray,
+        length: int,
+        pad: int,
         dtype: type[np.complexfloating] = np.complex64,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """sample_weight  (n_samples,): weights of the samples, with a `correction` among them"""
         self.device, self.length, self.pad, self.dtype = device, length, pad, dtype
         self.n_samples, self.stride = len(sample_weight), length + 2 * pad

@@ -91,9 +91,12 @@ def make_plan(
             least = min(least, error_of(interpolator(taps, oversample), length))
     reach = rounded_up(max(least, LEAST_TOLERANCE))
     raise ToleranceUnreachable(
-        tolerance, askable(reach), "rounding of the float32 grid", "backproject goes further",
+        tolerance,
+        askable(reach),
+        "rounding of the float32 grid",
+        "backproject goes further",
         how="by a polar format image",
-    )  # fmt: skip
+    )
 
 
 def _candidates(shape: tuple[int, ...], n_samples: int, tile: int) -> list[tuple[int, float, tuple[int, int], float]]:
@@ -174,7 +177,7 @@ class Gridder:
 
     def _parts(
         self, budget: float, shape: tuple[int, ...], row_bytes: float
-    ) -> tuple[OnHost | OnDevice, tuple[int, int]]:  # fmt: skip
+    ) -> tuple[OnHost | OnDevice, tuple[int, int]]:
         """What makes the image of the grid, and the `blocks`: the device where it can, at once where it fits."""
         device, length = self.device, self.plan.length
         flat = [

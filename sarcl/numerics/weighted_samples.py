@@ -30,7 +30,7 @@ def largest_part(samples: np.ndarray) -> float:
 
 def bound_of_held(
     device: Device, samples: np.ndarray, weights: tuple[float, float], n: int, dtype: type[np.complexfloating]
-) -> float | None:  # fmt: skip
+) -> float | None:
     """A modulus that no finite sample times its weights exceeds; None where a device may not sum n of them in `dtype`.
 
     weights  largest of rows and of samples
@@ -75,9 +75,14 @@ class WeightedSamples:
         return None if bound is not None and 0 < bound < FAINT else bound
 
     def make(
-        self, pipeline: Pipeline, samples: np.ndarray, row_weight: np.ndarray, cycles: tuple[np.ndarray, np.ndarray],
-        out: Any, first: int,
-    ) -> None:  # fmt: skip
+        self,
+        pipeline: Pipeline,
+        samples: np.ndarray,
+        row_weight: np.ndarray,
+        cycles: tuple[np.ndarray, np.ndarray],
+        out: Any,
+        first: int,
+    ) -> None:
         """Upload samples (n, n_samples), and enqueue their weighting to rows `first` ... of a buffer (..., n_samples).
 
         cycles  of each row's first sample, and from one sample to the next, less whole ones, float64 (n,)

@@ -56,8 +56,10 @@ def weights(window: Window | None, n: int) -> np.ndarray:
             f"window {_shown(window)} of {n} cells has weights that are not finite; its parameters are too large or 0"
         )
     if (made < 0).any() or not made.any():
-        raise ValueError(f"window {_shown(window)} has weights of {made.min():g} to {made.max():g}; a weight is not "
-                         "below zero, and not all are zero")  # fmt: skip
+        raise ValueError(
+            f"window {_shown(window)} has weights of {made.min():g} to {made.max():g}; a weight is not "
+            "below zero, and not all are zero"
+        )
     return made
 
 

@@ -67,8 +67,11 @@ def _writable() -> str:
         )
     log.warning(
         "the cache folder %r cannot be written (%s): kernels are kept in %s, which a restart may clear; set "
-        "XDG_CACHE_HOME to a folder that you may write to", own, why, other,
-    )  # fmt: skip
+        "XDG_CACHE_HOME to a folder that you may write to",
+        own,
+        why,
+        other,
+    )
     os.environ["XDG_CACHE_HOME"] = other
     if "POCL_CACHE_DIR" in os.environ:
         os.environ["POCL_CACHE_DIR"] = os.path.join(other, "pocl")

@@ -26,9 +26,13 @@ def trouble(index: int) -> str:
         own = {"XDG_CACHE_HOME": folder, "POCL_CACHE_DIR": folder, "PYOPENCL_NO_CACHE": "1"}
         try:
             done = subprocess.run(
-                [sys.executable, "-c", TRIAL, str(index)], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL, timeout=PATIENCE, env={**os.environ, **own},
-            )  # fmt: skip
+                [sys.executable, "-c", TRIAL, str(index)],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                timeout=PATIENCE,
+                env={**os.environ, **own},
+            )
         except (OSError, subprocess.TimeoutExpired):
             return ""
     if done.returncode >= 0:

@@ -21,7 +21,7 @@ class Batches:
 
     def __init__(
         self, device: Device, length: int, dtype: type[np.complexfloating], nbytes: float = float("inf")
-    ) -> None:  # fmt: skip
+    ) -> None:
         """nbytes  for the buffer and the FFT; one row is transformed at a time where they are too few for more"""
         self.device, self.length, self.dtype = device, length, dtype
         self.row_bytes = float(np.dtype(dtype).itemsize) * length + fft.temporary_bytes(length, dtype)

@@ -52,9 +52,12 @@ def listing() -> str:
 
 
 def open_lab(
-    paper: Paper, device: DeviceChoice | None = None, quick: bool = False, folder: Path | None = None,
+    paper: Paper,
+    device: DeviceChoice | None = None,
+    quick: bool = False,
+    folder: Path | None = None,
     progress: Callable[[str, int, int], None] | None = None,
-) -> Any:  # fmt: skip
+) -> Any:
     """Lab that the sections of a paper share, with its OpenCL device opened.
 
     quick     less of it (`Paper.quick`)

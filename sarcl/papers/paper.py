@@ -26,12 +26,17 @@ BASES: dict[Basis, str] = {
 }
 Cause = Literal["", "error in print", "interpretation"]
 CAUSES: tuple[tuple[Cause, str], ...] = (
-    ("error in print", "Errors in print: a sign, a subscript or a number of the paper contradicts the paper itself or "
-     "physics"),
-    ("interpretation", "Differences of interpretation: nothing is misprinted; the statement depends on an "
-     "approximation of the paper, or on what is measured and how"),
+    (
+        "error in print",
+        "Errors in print: a sign, a subscript or a number of the paper contradicts the paper itself or physics",
+    ),
+    (
+        "interpretation",
+        "Differences of interpretation: nothing is misprinted; the statement depends on an "
+        "approximation of the paper, or on what is measured and how",
+    ),
     ("", "Other differences"),
-)  # fmt: skip
+)
 
 
 @dataclass(frozen=True)

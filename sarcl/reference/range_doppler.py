@@ -17,9 +17,12 @@ def straighten(row: np.ndarray, positions: np.ndarray, cycles: np.ndarray, kerne
 
 
 def compressed(
-    spectra: np.ndarray, frequencies: np.ndarray, bends: np.ndarray, distance: float,
+    spectra: np.ndarray,
+    frequencies: np.ndarray,
+    bends: np.ndarray,
+    distance: float,
     weight: Callable[[np.ndarray], np.ndarray],
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """Spectra (bins, n_samples) compressed for a slant range, m, complex128: kernels/compression_filter.cl.
 
     frequencies  of the samples, Hz (n_samples,);  bends  c q/(2 v) of the bins, Hz (bins,)

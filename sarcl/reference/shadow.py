@@ -32,9 +32,12 @@ def _facing(triangles: np.ndarray, viewpoint: np.ndarray, other: np.ndarray | No
 
 
 def hidden(
-    triangles: np.ndarray, viewpoint: np.ndarray, places: np.ndarray = CENTROID, lift: float = 1e-6,
+    triangles: np.ndarray,
+    viewpoint: np.ndarray,
+    places: np.ndarray = CENTROID,
+    lift: float = 1e-6,
     other: np.ndarray | None = None,
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """True (k, n) where a facet, m (k, 3, 3), crosses the line from a sample to `viewpoint`, m (3,); other: see sample.
     False where the viewpoint is behind the side that both look at.
 

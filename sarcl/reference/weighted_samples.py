@@ -7,7 +7,7 @@ import numpy as np
 
 def turned(
     samples: np.ndarray, row_weight: np.ndarray, sample_weight: np.ndarray, first: np.ndarray, step: np.ndarray
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """Samples (n, n_samples) times both weights and exp(+j 2 pi (first + k step)), k their number: complex128.
 
     first, step   cycles (n,), longdouble where they are many: kernels/weighted_samples.cl

@@ -85,8 +85,11 @@ def _orbit(value: Orbit) -> dict[str, Any]:
         return {"states": {**_without_none(path, ("times", "positions", "velocities")), **epoch}}
     elements = {
         **_without_none(path, ("semi_major_axis", "eccentricity", "inclination", "node")),
-        "argument_of_perigee": path.perigee, "mean_anomaly": path.anomaly, "j2": path.with_j2, "span": value.span,
-    }  # fmt: skip
+        "argument_of_perigee": path.perigee,
+        "mean_anomaly": path.anomaly,
+        "j2": path.with_j2,
+        "span": value.span,
+    }
     return {"kepler": {**elements, **epoch}}
 
 
@@ -100,9 +103,11 @@ def _waveform(value: Waveform) -> dict[str, Any]:
 def _antenna(value: Antenna) -> dict[str, Any]:
     kind = {"aperture": "rectangular"}.get(value.kind, value.kind)
     own = {
-        "isotropic": (), "rectangular": ("size", "taper"), "gaussian": ("width", "frequency"),
+        "isotropic": (),
+        "rectangular": ("size", "taper"),
+        "gaussian": ("width", "frequency"),
         "table": ("azimuth", "elevation", "values", "frequency"),
-    }[kind]  # fmt: skip
+    }[kind]
     common = ("gain_db",) if kind == "isotropic" else ("gain_db", "two_way", "mount")
     return {kind: _without_none(value, (*own, *common))}
 

@@ -179,9 +179,13 @@ def _verdict(row: Mapping[str, Any], plain: Mapping[str, Any], null: float) -> s
             "end of the cut."
         )
     narrower = 1 - first["null"] / usual["null"]
-    change = f"as far from the peak, to {100 * SAME:g} %, as" if abs(narrower) < SAME else (
-        f"{100 * abs(narrower):.0f} % {'closer to the peak than' if narrower > 0 else 'farther from the peak than'}"
-    )  # fmt: skip
+    change = (
+        f"as far from the peak, to {100 * SAME:g} %, as"
+        if abs(narrower) < SAME
+        else (
+            f"{100 * abs(narrower):.0f} % {'closer to the peak than' if narrower > 0 else 'farther from the peak than'}"
+        )
+    )
     text = (
         f"the first nulls of {place} are {change} the conventional antenna's ({first['null']:.3f} m; conventional "
         f"{usual['null']:.3f}). Half-power width {first['irw']:.3f} m (conventional {usual['irw']:.3f}), peak at "

@@ -116,9 +116,7 @@ def averages(contents: Sequence[Contents], cells: np.ndarray, offset: Sequence[i
     normal = _unit(gradient, FLAT * np.abs(mean).max(axis=1, initial=0))
     has_normal = np.asarray(normal.any(axis=1))
     share = np.where(has_normal[:, None], normal**2, 1 / 3)
-    return Averages(
-        (share * mean).sum(axis=1), (share * inverse).sum(axis=1), normal, metal.mean(axis=1), series
-    )  # fmt: skip
+    return Averages((share * mean).sum(axis=1), (share * inverse).sum(axis=1), normal, metal.mean(axis=1), series)
 
 
 def _unit(gradient: np.ndarray, least: np.ndarray) -> np.ndarray:

@@ -82,9 +82,11 @@ class Box:
 
 
 def conductor(
-    lattice: Lattice, intervals: tuple[Intervals, Intervals, Intervals],
-    areas: tuple[FaceAreas, FaceAreas, FaceAreas] | None = None, staircase: bool = False,
-) -> Target:  # fmt: skip
+    lattice: Lattice,
+    intervals: tuple[Intervals, Intervals, Intervals],
+    areas: tuple[FaceAreas, FaceAreas, FaceAreas] | None = None,
+    staircase: bool = False,
+) -> Target:
     """The lists of a perfect conductor, from its intervals along x, y and z.
 
     areas      of faces across x, y and z; those of other faces are made from their edges

@@ -41,8 +41,10 @@ class AnchorFiles:
         if others := [p for p in self.folder.glob("*.anchor") if not p.name.startswith(mark)]:
             log.warning(
                 "%s holds %d finished anchors of another task, which are not used; delete the folder where that task "
-                "will not be continued", self.folder, len(others),
-            )  # fmt: skip
+                "will not be continued",
+                self.folder,
+                len(others),
+            )
 
     def load(self, pulse: int, sent: str, shape: tuple[int, ...]) -> tuple[np.ndarray, RunEnd] | None:
         """Echoes of `shape`, and how the runs ended; None where there is no such file, or a damaged one."""

@@ -17,28 +17,38 @@ def check_bodies(scene: Scene) -> None:
     """
     said = "scene has {}, and fullwave_echo computes closed bodies of smooth facets: {}"
     if len(scene.positions):
-        raise ValueError(said.format(
-            f"{len(scene.positions)} points", "leave them out, or add the samples that echo computes for them"
-        ))  # fmt: skip
+        raise ValueError(
+            said.format(
+                f"{len(scene.positions)} points", "leave them out, or add the samples that echo computes for them"
+            )
+        )
     if scene.heights is not None:
         raise ValueError(said.format("terrain, which is open at its rim", "use echo for terrain"))
     if scene.roughness.any() or scene.point_roughness.any():
         n = int((scene.roughness > 0).sum() + scene.point_roughness.any(axis=(1, 2)).sum())
-        raise ValueError(said.format(
-            f"{n} facets with a random roughness",
-            "give roughness=0, or scene.realized(seed), which moves the corners of the mesh",
-        ))  # fmt: skip
+        raise ValueError(
+            said.format(
+                f"{n} facets with a random roughness",
+                "give roughness=0, or scene.realized(seed), which moves the corners of the mesh",
+            )
+        )
     if (scene.reflectivity != 1).any():
         low = float(scene.reflectivity.min())
-        raise ValueError(said.format(
-            f"facets of reflectivity {low:g}, a factor of physical optics", "give a material of its permittivity and "
-            "conductivity, such as sarcl.Material(eps_r=3, conductivity=0.01), or reflectivity 1",
-        ))  # fmt: skip
+        raise ValueError(
+            said.format(
+                f"facets of reflectivity {low:g}, a factor of physical optics",
+                "give a material of its permittivity and "
+                "conductivity, such as sarcl.Material(eps_r=3, conductivity=0.01), or reflectivity 1",
+            )
+        )
     for material in scene.materials:
         if material.height or material.diagram not in ("smooth", "sinc"):
-            raise ValueError(said.format(
-                f"{_named(material)} with roughness finer than a facet", "give one with height 0 and diagram 'smooth'"
-            ))  # fmt: skip
+            raise ValueError(
+                said.format(
+                    f"{_named(material)} with roughness finer than a facet",
+                    "give one with height 0 and diagram 'smooth'",
+                )
+            )
 
 
 def check_wavelengths(scene: Scene, cells: float, highest: float) -> None:

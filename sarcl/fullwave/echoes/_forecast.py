@@ -26,9 +26,12 @@ ERROR, SPACING, WIDEST = 3e-2, 0.75, 1.5
 
 
 def forecast_of(
-    task: FullwaveTask, coarse: FullwaveTask | None, anchors: str | int | np.ndarray, planning: float,
+    task: FullwaveTask,
+    coarse: FullwaveTask | None,
+    anchors: str | int | np.ndarray,
+    planning: float,
     run: Callable[[], PhaseHistory],
-) -> Forecast[PhaseHistory]:  # fmt: skip
+) -> Forecast[PhaseHistory]:
     """Forecast of `run`, which makes the echoes of a task.
 
     coarse  the task on larger cells that predicts the error of the grid, or None;  planning  seconds so far

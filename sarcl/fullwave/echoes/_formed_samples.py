@@ -30,9 +30,12 @@ class FormedSamples:
 
 
 def formed_samples(
-    task: FullwaveTask, coarse: FullwaveTask | None, anchors: str | int | np.ndarray, files: AnchorFiles | None,
+    task: FullwaveTask,
+    coarse: FullwaveTask | None,
+    anchors: str | int | np.ndarray,
+    files: AnchorFiles | None,
     clock: Clock,
-) -> FormedSamples:  # fmt: skip
+) -> FormedSamples:
     """Runs the anchors of every polarisation that is sent, and forms the samples.
 
     coarse  the task on larger cells that predicts the error of the grid, or None;  files  for finished anchors, or None
@@ -44,9 +47,14 @@ def formed_samples(
     for sent, indices in task.sendings:
         twins = task.twins[sent]
         runs = AnchorRuns(
-            task, sent, [task.polarizations[i][0] for i in indices], files=files, progress=progress, twins=twins,
+            task,
+            sent,
+            [task.polarizations[i][0] for i in indices],
+            files=files,
+            progress=progress,
+            twins=twins,
             counts=counts,
-        )  # fmt: skip
+        )
         mirror = np.array([twins[p].pulse if p in twins else -1 for p in range(n_pulses)])
         echoes = anchored(runs, task.along, anchors=anchors, tolerance=options.tolerance, mirror=mirror)
         clock.lap("runs")

@@ -184,9 +184,14 @@ class FullwaveTask:
         }
 
     def formed(
-        self, pulse: int, sent: str, received: list[str], pulses: np.ndarray, progress: RunProgress,
+        self,
+        pulse: int,
+        sent: str,
+        received: list[str],
+        pulses: np.ndarray,
+        progress: RunProgress,
         twin: runs.Twin | None = None,
-    ) -> tuple[list[np.ndarray], runs.RunEnd]:  # fmt: skip
+    ) -> tuple[list[np.ndarray], runs.RunEnd]:
         """Echoes (n, Q, F) at some pulses (n,), formed from the currents of an anchor at one pulse, phase zero at the
         centre, and from those of its twin, where one is given; and how the runs ended.
         """

@@ -38,10 +38,14 @@ def steady(lab: Lab) -> Section:
         if n > 45:
             out.states("{name}: places are moved", shift, (shift < 0) == (step > 0), direction=direction)
         nulls = [lab.measure(raw)["null"] for raw in (actual, mapped)]
-        remark = "" if step > 0 else (
-            f"the mapping changes nothing, but the centre frequency is now {case.middle / 1e9:.2f} GHz (section "
-            f"5.3.1), whose wave resolves {case.null:.3f} m over 430 m; figure 5.5 wants f0 moved as well"
-        )  # fmt: skip
+        remark = (
+            ""
+            if step > 0
+            else (
+                f"the mapping changes nothing, but the centre frequency is now {case.middle / 1e9:.2f} GHz (section "
+                f"5.3.1), whose wave resolves {case.null:.3f} m over 430 m; figure 5.5 wants f0 moved as well"
+            )
+        )
         out.number("{name}: nulls in cross-range", nulls[1], expected=PRINTED, why=remark)
         out.states("{name}: nulls before and after the mapping", nulls, abs(nulls[0] - nulls[1]) < 0.002)
         curves.append((name, actual.tx[::THIN, 1], y[::THIN]))

@@ -100,9 +100,13 @@ def errors(lab: Lab) -> Section:
             array, F0, times=1e7 / SPEED_OF_LIGHT + t, positions=1e7 * directions(azimuth, 0.0), device=lab.device
         )
         factor = closed.diverse_factor(
-            F0, shape=SHAPE, spacing=SPACING, frequency_step=(step, 0), cosines=(np.sin(azimuth), 0.0),
+            F0,
+            shape=SHAPE,
+            spacing=SPACING,
+            frequency_step=(step, 0),
+            cosines=(np.sin(azimuth), 0.0),
             retarded=t[:, None],
-        )  # fmt: skip
+        )
         exact, approximate = (closed.power_pattern(f, 81) for f in (field, factor))
         apart = np.abs(exact - approximate).max(axis=0)
         curves.append((f"{step / 1e6:g} MHz", degrees, apart))

@@ -98,9 +98,13 @@ def _echoes(lab: Lab, radar: FarRadar, case: Case, number: np.ndarray, materials
         fine = np.repeat(np.repeat(strip, case.facets[0], axis=0), case.facets[1], axis=1)
         y = radar.null[0] * first - half[0], radar.null[0] * (first + len(strip)) - half[0]
         scene = ground(
-            y, (-half[1], half[1]), fine.shape, material=fine, materials=materials,
+            y,
+            (-half[1], half[1]),
+            fine.shape,
+            material=fine,
+            materials=materials,
             point_roughness=case.sigma * SPEED_OF_LIGHT / radar.center,
-        )  # fmt: skip
+        )
         raw = radar.echo(scene, seed=seed, reference=(0, 0, 0), range_window=(-deep, deep), device=lab.device)
         total = raw if total is None else replace(raw, samples=np.asarray(raw.samples) + np.asarray(total.samples))
         first += len(strip)

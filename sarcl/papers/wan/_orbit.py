@@ -45,9 +45,12 @@ def section(lab: Lab) -> Section:
     height = SCALE * (FOOT[2] + CUBOID[2] + TOP[1])
     window = SCALE * (SIDES[1] + 5) + height
     grid = ImageGrid.plane(
-        center=origin, shape=(int(2 * SCALE * SIDES[0] / 3), int(2 * SCALE * SIDES[1] / 3)), spacing=3.0,
-        normal=axes[2], x_axis=axes[0],
-    )  # fmt: skip
+        center=origin,
+        shape=(int(2 * SCALE * SIDES[0] / 3), int(2 * SCALE * SIDES[1] / 3)),
+        spacing=3.0,
+        normal=axes[2],
+        x_axis=axes[0],
+    )
     power, first = np.zeros(grid.shape), None
     for seed in range(LOOKS[lab.quick]):
         scene = _scene(axes, origin, seed)

@@ -48,10 +48,15 @@ def section(lab: Lab) -> Section:
         curves_db = [(label, degrees, _db(error)) for label, error in curves]
         out.plot("Error of waveform forming at each azimuth", curves_db)
         own_seconds = sum(report.seconds.values())
-        times.append([
-            name, f"{errors.seconds[0] * n:.0f}", f"{errors.seconds[1]:.1f}", f"{own_seconds:.0f}",
-            f"{errors.seconds[0] * n / own_seconds:.0f}",
-        ])  # fmt: skip
+        times.append(
+            [
+                name,
+                f"{errors.seconds[0] * n:.0f}",
+                f"{errors.seconds[1]:.1f}",
+                f"{own_seconds:.0f}",
+                f"{errors.seconds[0] * n / own_seconds:.0f}",
+            ]
+        )
         out.keep(**{name: {
             "azimuth_deg": degrees, "one_anchor": errors.one, "own_anchors": errors.own, "totals": errors.totals,
             "seconds_per_azimuth": errors.seconds[0], "seconds_one_anchor": errors.seconds[1], "anchors": anchors,
@@ -89,9 +94,12 @@ def compared(lab: Lab, name: str) -> Comparison:
     positions = track.positions[rows]
     errors = [np.linalg.norm(made - exact, axis=1) for made in (echoes[1], own)]
     return Comparison(
-        np.arctan2(positions[:, 1], np.hypot(positions[:, 0], positions[:, 2])), errors[0] / norm, errors[1] / norm,
-        (_root(errors[0]) / _root(norm), _root(errors[1]) / _root(norm)), (seconds[0] / len(pulses), seconds[1]),
-    )  # fmt: skip
+        np.arctan2(positions[:, 1], np.hypot(positions[:, 0], positions[:, 2])),
+        errors[0] / norm,
+        errors[1] / norm,
+        (_root(errors[0]) / _root(norm), _root(errors[1]) / _root(norm)),
+        (seconds[0] / len(pulses), seconds[1]),
+    )
 
 
 def _root(values: np.ndarray) -> float:

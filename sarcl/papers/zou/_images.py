@@ -117,9 +117,14 @@ class _View:
         """The range-Doppler image of samples."""
         time, middle = self.half / SPEED, self.lab.radar.range_
         return range_doppler(
-            chain, side="right", times=(-time, time), ranges=(middle - self.half, middle + self.half),
-            spacing=(SPACING / SPEED, SPACING), check=False, device=self.lab.device,
-        )  # fmt: skip
+            chain,
+            side="right",
+            times=(-time, time),
+            ranges=(middle - self.half, middle + self.half),
+            spacing=(SPACING / SPEED, SPACING),
+            check=False,
+            device=self.lab.device,
+        )
 
     def picture(self, amplitude: np.ndarray, caption: str) -> html.Block:
         """Pixels, m, with the outline."""

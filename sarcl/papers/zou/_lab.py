@@ -52,9 +52,12 @@ class Lab:
     """
 
     def __init__(
-        self, device: DeviceChoice | None = None, quick: bool = False, folder: Path | None = None,
+        self,
+        device: DeviceChoice | None = None,
+        quick: bool = False,
+        folder: Path | None = None,
         progress: Callable[[str, int, int], None] | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.device, self.quick, self.progress = device, quick, progress
         self.folder = None if quick else folder
         self.radar = Radar(REDUCTION[quick])
