@@ -143,6 +143,16 @@ def test_points_that_some_pulses_do_not_see_are_added_directly(device):
     assert raw.report.plan["method"] == "factorized" != direct.report.plan["method"]
 
 
+@pytest.mark.parametrize("beyond", [0.05, 0.5, 0.9, 1.4])
+def test_points_at_the_ends_of_a_profile(device, beyond):
+    scene = cloud(800)
+    delta = np.linalg.norm(line()[:, None] - scene.positions, axis=-1) - np.linalg.norm(line(), axis=1)[:, None]
+    window = float(delta.min()) - beyond, float(delta.max()) + beyond
+    options = {"range_window": window, "reference": (0.0, 0.0, 0.0), "device": device}
+    raw = factorized_echo(scene, line(), 1e-3, **options)
+    assert error_of(raw, scene) <= raw.report.predicted_error
+
+
 def test_points_in_the_window_are_judged_safely():
     positions, track = cloud().positions, circle(arc=0.6)
     ranges = np.linalg.norm(track, axis=1)
