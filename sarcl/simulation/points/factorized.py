@@ -176,10 +176,11 @@ class _Ascent:
         self.within = budget / max(len(levels) - 1, 1)  # bytes of the profiles of each deeper level
 
     def _bytes(self, level: int, n_pulses: int) -> float:
-        """Bytes of a cell's profiles, and of the records by which they are added to those of so many pulses."""
+        """Bytes of a cell's profiles, and of records by which they are made and added to those of so many pulses."""
         planned = self.plan.levels[level]
         moves = 4 * (4 + self.plan.between.taps) * n_pulses
-        return 8.0 * planned.stride * len(planned.decimation.kept) + moves
+        per_pulse = 8 * planned.stride + (self.constants.nbytes if planned is self.plan.levels[-1] else 0)
+        return float(per_pulse * len(planned.decimation.kept) + moves)
 
     def profiles(self, level: int, low: int, high: int) -> Buffer:
         """Profiles of cells low ... high - 1 of a level: a buffer (high - low, kept pulses, stride, 2)."""
