@@ -76,7 +76,7 @@ class WeightedSamples:
 
     def make(
         self, pipeline: Pipeline, samples: np.ndarray, row_weight: np.ndarray, cycles: tuple[np.ndarray, np.ndarray],
-        out: Any, first: int,
+        out: object, first: int,
     ) -> None:  # fmt: skip
         """Upload samples (n, n_samples), and enqueue their weighting to rows `first` ... of a buffer (..., n_samples).
 
@@ -90,7 +90,7 @@ class WeightedSamples:
             out,
         )  # fmt: skip
 
-    def add_energy(self, weighted: Any, first: int, rows: slice, largest: float) -> None:
+    def add_energy(self, weighted: object, first: int, rows: slice, largest: float) -> None:
         """Enqueue the sums of squares of rows of a buffer of `make`, from row `first` on.
 
         rows  their numbers among all;  largest  a modulus that none exceeds
