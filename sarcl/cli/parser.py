@@ -60,7 +60,7 @@ def _image_endings() -> str:
     return formats.suggested(formats.writing("picture", "image"))
 
 
-def _flag(group: Any, words: str, text: str) -> None:
+def _flag(group: object, words: str, text: str) -> None:
     """Add an option without a value."""
     _add(group, words, text, action="store_true")
 
