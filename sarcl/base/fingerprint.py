@@ -24,7 +24,7 @@ def as_bytes(values: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(values).reshape(-1).view(np.uint8)
 
 
-def checksum(*values: Any) -> str:
+def checksum(*values: object) -> str:
     """Checksum of arrays, numbers (or tuples of them), strings and None, with shapes and types."""
     made = checker()
     for value in values:

@@ -14,7 +14,7 @@ import functools
 import inspect
 import textwrap
 from collections.abc import Callable
-from typing import Any, Protocol, TypeVar
+from typing import Protocol, TypeVar
 
 from .forecast import Plan
 from .options import Options, described
@@ -39,7 +39,7 @@ class Verb(Protocol[R_co]):
     def planned(self) -> Callable[..., Plan[R_co]]:
         """Its Plan for some arguments."""
 
-    def __call__(self, *args: Any, **options: Any) -> R_co:
+    def __call__(self, *args: object, **options: object) -> R_co:
         """The result of the plan for these arguments."""
 
 
@@ -51,7 +51,7 @@ def verb(record: type[Options]) -> Callable[[Callable[..., Plan[R]]], Verb[R]]:
         subjects = [p for p in signature.parameters.values() if p.name != "options"]
         names, known = [p.name for p in subjects], list(described(record))
 
-        def planned(*args: Any, **given: Any) -> Plan[R]:
+        def planned(*args: object, **given: object) -> Plan[R]:
             if len(args) > len(names):
                 raise TypeError(f"{plan.__name__} takes {', '.join(names)} by position; give options by name")
             for name in given:
@@ -61,7 +61,7 @@ def verb(record: type[Options]) -> Callable[[Callable[..., Plan[R]]], Verb[R]]:
             return plan(*args, **own, options=record(**given))
 
         @functools.wraps(plan)
-        def function(*args: Any, **given: Any) -> R:
+        def function(*args: object, **given: object) -> R:
             return function.planned(*args, **given).run()  # type: ignore[attr-defined]
 
         function.planned, function.options = planned, record  # type: ignore[attr-defined]

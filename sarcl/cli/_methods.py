@@ -59,7 +59,7 @@ class Method:
         """The Forecast."""
         return verbs.plan(getattr(verbs, self.name), *self._subjects(raw, grid), **self.options, device=device)
 
-    def image(self, raw: PhaseHistory, grid: ImageGrid | None, device: object, **running: Any) -> Image | None:
+    def image(self, raw: PhaseHistory, grid: ImageGrid | None, device: object, **running: object) -> Image | None:
         """The image; None for a piece. running: `out`, `progress`, and `tile` and `resume` of backproject."""
         verb = getattr(verbs, self.name)
         image: Image | None = verb(*self._subjects(raw, grid), **self.options, device=device, **running)
@@ -69,7 +69,7 @@ class Method:
         return (raw,) if grid is None else (raw, grid)
 
 
-def heights(args: argparse.Namespace) -> Any:
+def heights(args: argparse.Namespace) -> object:
     """--heights as a number, m, or an ElevationModel; 0 where it is left out. ValueError for options of the other."""
     text = args.heights
     try:

@@ -60,7 +60,7 @@ def _image_endings() -> str:
     return formats.suggested(formats.writing("picture", "image"))
 
 
-def _flag(group: Any, words: str, text: str) -> None:
+def _flag(group: object, words: str, text: str) -> None:
     """Add an option without a value."""
     _add(group, words, text, action="store_true")
 
@@ -239,7 +239,7 @@ class _Version(argparse.Action):
         parser.exit()
 
 
-def window(text: str) -> Any:
+def window(text: str) -> object:
     """ "none", "hamming", "taylor:35:5" or "hann,none" as `backproject` takes it."""
     from ..numerics.windows import parse
 

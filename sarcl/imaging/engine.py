@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -74,7 +74,7 @@ class Engine(Protocol):
     dtype: type[np.complexfloating]
     least_pixels: float
 
-    def __init__(self, device: Device, task: FocusingTask, plan: Any, tiling: Tiling) -> None: ...
+    def __init__(self, device: Device, task: FocusingTask, plan: object, tiling: Tiling) -> None: ...
 
     def blocks(self, nbytes: float) -> list[Run]:
         """Runs (first, last) of bands that together are all, each to be filled with nbytes on the device.

@@ -54,7 +54,7 @@ class CheckedRows(h5py.Dataset):
                     self._compare(self._read(slice(block * step, min((block + 1) * step, self.shape[0]))), block)
         return self._read(args, new_dtype)
 
-    def read_direct(self, dest: Any, source_sel: Any = None, dest_sel: Any = None) -> None:
+    def read_direct(self, dest: object, source_sel: object = None, dest_sel: object = None) -> None:
         """The method of h5py.Dataset, after the check of all rows."""
         for start in range(0, self.shape[0], self._sums.step):
             if not self._good[block := start // self._sums.step]:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..opencl import fft
-from ..opencl.device import Device
+from ..opencl.device import Buffer, Device
 from .transforms import Transforms
 
 WORK = 1 / 6  # largest share of a budget for the rows, or columns, that are transformed at a time
@@ -26,13 +26,13 @@ class OnHost:
     def __init__(self, device: Device, length: tuple[int, int], flat: list[np.ndarray]) -> None:
         """flat  factors of the rows and of the columns of the image, one over the kernel's transform"""
         self.device, self.length, self.flat = device, length, [f.astype(np.float32) for f in flat]
-        self._half: np.ndarray | None = None  # columns of the image, rows of the grid
+        self._half: Any = None  # columns of the image, rows of the grid
 
     def across(self, tile: int) -> float:
         """Bytes on the device for a row of tiles of the grid."""
         return 8.0 * self.length[1] * tile
 
-    def add(self, grid: Any, first: int, rows: int) -> None:
+    def add(self, grid: Buffer, first: int, rows: int) -> None:
         """Rows first ... of the grid, in a buffer (rows, length[1])."""
         if self._half is None:
             self._half = np.empty((len(self.flat[1]), self.length[0]), np.complex64)
@@ -63,7 +63,8 @@ class OnDevice:
         """work  bytes, at most, for the rows that are transformed at a time, and once more for where they come from"""
         self.device, self.length, self.flat, self.whole = device, length, flat, whole
         self.shape = len(flat[0]), len(flat[1])
-        self._work, self._grid = work, None
+        self._work = work
+        self._grid: Buffer | None = None
         along, across = (Transforms(device, m, m, work).nbytes for m in length)
         self.nbytes = along + across + (8.0 * self.shape[1] * length[0] if whole else 0.0)
         self._flat = [device.copied(f.astype(np.float32)) for f in flat]
@@ -81,7 +82,7 @@ class OnDevice:
         """Bytes on the device for a row of tiles of the grid, and for its part of the columns that are downloaded."""
         return 8.0 * tile * (self.length[1] + (0 if self.whole else self.shape[1]))
 
-    def add(self, grid: Any, first: int, rows: int) -> None:
+    def add(self, grid: Buffer, first: int, rows: int) -> None:
         """Rows first ... of the grid, in a buffer (rows, length[1]) that is kept where all stays on the device."""
         device, columns = self.device, self.shape[1]
         if self._transforms is None:

@@ -123,7 +123,7 @@ class SpreadSamples:
         """Bytes on the device per row, beside the profiles themselves, at most."""
         return self._batches.row_bytes + 8.0 * self.n_samples if self._batches else 0.0
 
-    def of(self, sums: Any, parts: int, rows: int) -> np.ndarray:
+    def of(self, sums: Buffer, parts: int, rows: int) -> np.ndarray:
         """Samples (rows, n_samples) of a buffer (parts, rows, 3, length + 2 padding), complex64.
 
         A profile is the sum of all parts, and of planes 1 and 2 of each: a total and its rest.

@@ -29,7 +29,7 @@ def exact_product(a: Any, b: Any) -> Pair:
     return p, ((ah * bh - p) + ah * bl + al * bh) + al * bl
 
 
-def quotient(a: Pair, b: Any) -> Pair:
+def quotient(a: Pair, b: object) -> Pair:
     """a/b to about 104 bits."""
     first = a[0] / b
     p, e = exact_product(first, b)

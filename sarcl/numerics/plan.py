@@ -138,7 +138,7 @@ def least(n_samples: int, chunk: int, steps: float = 0.0) -> float:
     return float(max(fixed / FIXED, fixed + interpolator_choice.least_error(n_samples, steps)) * (1 + 1e-9))
 
 
-def skips(skip: Any, known: tuple[str, ...]) -> set[str]:
+def skips(skip: object, known: tuple[str, ...]) -> set[str]:
     """The reasons to skip, of True (all), False (none) or a set of names; ValueError lists the known ones."""
     if isinstance(skip, (bool, np.bool_)):
         return set(known) if skip else set()

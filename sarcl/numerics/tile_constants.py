@@ -28,7 +28,14 @@ class TileConstants:
         self.kernel = device.kernel("tile_constants.cl", "tile_constants", **{k: int(v) for k, v in macros.items()})
 
     def compute(
-        self, pulse: Any, n: int, references: Any, radius: Any, tiles: tuple[int, int], n_tiles: int, skip: int = 0
+        self,
+        pulse: object,
+        n: int,
+        references: object,
+        radius: object,
+        tiles: tuple[int, int],
+        n_tiles: int,
+        skip: int = 0,
     ) -> Any:
         """Records (end - first, n, components) float32, on the device, of the tiles (first, end) and `n` pulses.
 

@@ -61,7 +61,7 @@ class Transforms:
         self._batches.transform()
 
     def lay(
-        self, out: Any, stride: int, first: int, count: int, weights: tuple[Buffer, int], origin: int = 0,
+        self, out: object, stride: int, first: int, count: int, weights: tuple[Buffer, int], origin: int = 0,
         sign: int = 1,
     ) -> None:  # fmt: skip
         """The last `count` transforms as columns, from `first` on, of a buffer (n, stride), the array itself perhaps.

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..base import float_pairs
-from ..opencl.device import Device
+from ..opencl.device import Buffer, Device
 from ..opencl.pipeline import SLOTS, Pipeline
 from .range_profiles import LARGEST
 
@@ -80,7 +80,7 @@ class WeightedSamples:
         samples: np.ndarray,
         row_weight: np.ndarray,
         cycles: tuple[np.ndarray, np.ndarray],
-        out: Any,
+        out: Buffer,
         first: int,
     ) -> None:
         """Upload samples (n, n_samples), and enqueue their weighting to rows `first` ... of a buffer (..., n_samples).
@@ -95,7 +95,7 @@ class WeightedSamples:
             out,
         )  # fmt: skip
 
-    def add_energy(self, weighted: Any, first: int, rows: slice, largest: float) -> None:
+    def add_energy(self, weighted: object, first: int, rows: slice, largest: float) -> None:
         """Enqueue the sums of squares of rows of a buffer of `make`, from row `first` on.
 
         rows  their numbers among all;  largest  a modulus that none exceeds

@@ -314,7 +314,7 @@ def once(make: Callable[..., Device]) -> Callable[..., Device]:
     kept = functools.cache(make)
 
     @functools.wraps(make)
-    def found(*args: Any, **options: Any) -> Device:
+    def found(*args: object, **options: object) -> Device:
         with _opening:
             return kept(*args, **options)
 

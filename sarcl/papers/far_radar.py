@@ -44,7 +44,7 @@ class FarRadar:
         """Unit vector from the scene to the radar (3,)."""
         return np.array([-np.sin(self.look), 0, np.cos(self.look)])
 
-    def echo(self, scene: Scene, **options: Any) -> PhaseHistory:
+    def echo(self, scene: Scene, **options: object) -> PhaseHistory:
         """Echoes of a scene about the origin, to 1e-2 unless the options, `sarcl.echo`'s, say otherwise."""
         n = self.n_pulses
         azimuth = np.pi + self.turn * ((np.arange(n) + 0.5) / n - 0.5)
@@ -58,7 +58,7 @@ class FarRadar:
         """A grid about the origin with so many pixels per null: along y and x, or the same for both."""
         return ImageGrid.plane(shape=(shape[0], shape[1]), spacing=np.array(self.null) / pixels, **options)
 
-    def focus(self, raw: PhaseHistory, grid: ImageGrid, **options: Any) -> np.ndarray:
+    def focus(self, raw: PhaseHistory, grid: ImageGrid, **options: object) -> np.ndarray:
         """Pixels whose |.|^2 is the radar cross section of a point, m^2."""
         image = backproject(raw, grid, **{"tolerance": 1e-2, "check": False, **options})
         return image.normalized()

@@ -103,7 +103,7 @@ class Section:
         texts = _texts(paper)[key]
         return cls(key, texts["title"].format(**words), texts, words)
 
-    def number(self, item: str, measured: float, **words: Any) -> None:
+    def number(self, item: str, measured: float, **words: object) -> None:
         """A row that holds where `measured` lies `within` so much of the expected number; words: as `states` has them,
         and form and unit of both numbers."""
         text = {"unit": "", "form": ".3f", **self.texts.get(item, {}), **words}

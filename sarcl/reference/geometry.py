@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
+
+Real = np.ndarray | np.floating
 
 
 def half_path(tx: np.ndarray, rx: np.ndarray, points: np.ndarray, reference_range: float) -> np.ndarray:
@@ -20,7 +20,7 @@ def half_path(tx: np.ndarray, rx: np.ndarray, points: np.ndarray, reference_rang
     return (_beyond(x, tx, b) + _beyond(x, rx, rest) - low) / 2
 
 
-def _beyond(x: np.ndarray, end: np.ndarray, b: Any) -> np.ndarray:
+def _beyond(x: np.ndarray, end: np.ndarray, b: Real) -> np.ndarray:
     """|x - end| - b, m (n,)."""
     square, low = _square(np.broadcast_to(b, len(x)))
     square, low = -square, -low
@@ -38,14 +38,14 @@ def _beyond(x: np.ndarray, end: np.ndarray, b: Any) -> np.ndarray:
     return np.asarray((square + low) / np.where(length + b > 0, length + b, 1))
 
 
-def _sum(a: Any, b: Any) -> tuple[Any, Any]:
+def _sum(a: Real, b: Real) -> tuple[Real, Real]:
     """a + b and its rounding error (Knuth)."""
     total = a + b
     part = total - a
     return total, (a - (total - part)) + (b - part)
 
 
-def _square(a: Any) -> tuple[Any, Any]:
+def _square(a: Real) -> tuple[Real, Real]:
     """a^2 and its rounding error (Dekker), for any length of longdouble's mantissa."""
     bits = np.finfo(np.longdouble).nmant + 1
     spread = a * np.longdouble(2 ** ((bits + 1) // 2) + 1)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -263,7 +263,7 @@ class Case:
         waveform: Waveform,
         track: Trajectory,
         device: DeviceChoice | None,
-        **options: Any,
+        **options: object,
     ) -> PhaseHistory:
         return echo(
             Scene.points([[0.0, y, 0.0] for y in places]), waveform, track, reference=(0, 0, 0), check=False,

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from ...base.boxes import corners
@@ -35,7 +33,7 @@ def check_outside(scene: Scene, antennas: dict[str, np.ndarray]) -> None:
 
 
 def window_of(
-    scene: Scene, waveform: Waveform, tx: np.ndarray, rx: np.ndarray, reference_range: np.ndarray, asked: Any
+    scene: Scene, waveform: Waveform, tx: np.ndarray, rx: np.ndarray, reference_range: np.ndarray, asked: object
 ) -> tuple[float, float]:
     """The range window, m: as asked, or the smallest that holds the scene's box, and waves that creep round it, plus
     10 %.

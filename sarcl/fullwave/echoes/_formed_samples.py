@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -70,7 +69,7 @@ def formed_samples(
     return FormedSamples(samples, _report(task, sums, counts, clock))
 
 
-def checked_anchors(asked: Any, n_pulses: int) -> str | int | np.ndarray:
+def checked_anchors(asked: object, n_pulses: int) -> str | int | np.ndarray:
     """`anchors` as `anchored` takes it."""
     if isinstance(asked, str):
         return choice("anchors", asked, ("auto",))

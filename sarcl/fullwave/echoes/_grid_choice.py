@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from ...base import host_memory
@@ -34,7 +32,7 @@ def default_bytes(device: Device) -> float:
     return SHARE * (installed if device.is_cpu and np.isfinite(installed) else min(device.info.memory, installed))
 
 
-def chosen_cells(asked: Any, scene: Scene, highest: float, tolerance: float) -> float:
+def chosen_cells(asked: object, scene: Scene, highest: float, tolerance: float) -> float:
     """`cells` as a number; "auto": AUTO for conductors, and for dielectrics as many as leave about the tolerance as an
     error of the grid, AUTO_INSIDE per wavelength in the body at a tolerance of AUTO_ERROR, by its square root.
 

@@ -42,6 +42,7 @@ class WeightedRows:
             self._out = self.device.empty(8 * self._rows * raw.n_samples)
         samples, weights = raw.read(start, stop), self.task.row_weight[rows]
         bound = self._weigher.bound(samples, weights)
+        assert self._out is not None
         if bound is not None:
             self._weigher.make(pipeline, samples, weights, self._cycles(rows), self._out, 0)
             self.largest = max(self.largest, bound)
@@ -49,7 +50,6 @@ class WeightedRows:
         else:
             self.held = False
             self.device.write(self._out, self._on_host(start, stop))
-        assert self._out is not None
         return self._out
 
     def energy(self) -> float:

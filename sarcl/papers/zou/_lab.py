@@ -84,7 +84,7 @@ class Lab:
         track: Trajectory,
         polarization: Polarization | Sequence[Polarization],
         kept: str,
-        **options: Any,
+        **options: object,
     ) -> PhaseHistory:
         """Echoes by full wave; kept: what the file of a full run is called beside the name of the target."""
         scene, out = self.scene(name), None

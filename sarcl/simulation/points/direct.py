@@ -15,7 +15,7 @@ from ...numerics.plan import Plan
 from ...numerics.polynomials import lagrange
 from ...numerics.pulse_geometry import PulseGeometry
 from ...numerics.tile_constants import TileConstants
-from ...opencl.device import Device
+from ...opencl.device import Buffer, Device
 from ...opencl.launch_numbers import launch_numbers
 from ...scattering.antenna_weights import AntennaWeights
 from ...scattering.scatterers import Points
@@ -106,7 +106,7 @@ class _PointKernel:
         most, lanes = min(most_pulses(device), int(spreader.budget / 2 / per_pulse)), device.info.vector_width
         self.pulses_at_once = max(1, most // lanes) * lanes
 
-    def profiles(self, start: int, stop: int) -> tuple[object, int, int]:
+    def profiles(self, start: int, stop: int) -> tuple[Buffer, int, int]:
         """Range profiles of pulses start ... stop - 1 on the device, as `SpreadSamples.of` takes them, and numbers of
         pairs that were added, and out of the beam."""
         device, tiles, weights, n_pulses = self.device, self.tiles, self.view.weights, stop - start
