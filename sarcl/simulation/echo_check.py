@@ -20,7 +20,8 @@ CANDIDATES = 256  # pulses among which those that are checked are drawn
 MOST_DRAWS = 16  # pulses, and frequencies at each of them
 FEWEST_DRAWS, MANY_FACETS = (4, 2), 2_000_000  # up to so many facets, and above
 FACET_SAMPLES = 256 * 20_000  # facets times samples: two or three seconds
-PER_FACET, PER_POINT = 5e-7, 6e-8  # s, to recompute the share of a facet or point in a sample, on one core
+# s, to recompute the share of a facet in a sample, on one core; of a point, and where its gain changes over the band
+PER_FACET, PER_POINT, PER_GAIN = 5e-7, 1.5e-7, 1.3e-6
 PER_LIT_PART = 5e-3  # s, to recompute the lit part of a facet, past some ten occluders, on one core
 
 
@@ -44,7 +45,8 @@ def seconds_to_check(scene: SceneEchoes) -> float:
     rows = None if scene.facets is None else scene.facets.lit_rows
     partly = 0 if rows is None else int((rows >= 0).sum())
     draws = draws_of(scene)
-    return MOST_DRAWS**2 * points * PER_POINT + draws**2 * facets * PER_FACET + draws * partly * PER_LIT_PART
+    per_point = PER_GAIN if scene.weights.varies_over_band else PER_POINT
+    return MOST_DRAWS**2 * points * per_point + draws**2 * facets * PER_FACET + draws * partly * PER_LIT_PART
 
 
 def worth_checking(scene: SceneEchoes, check: bool | None, channels: float = 1) -> bool:
@@ -123,10 +125,12 @@ def _exact(part: Points | FacetSet, view: ChannelView, p: int) -> tuple[np.ndarr
     powers = np.zeros(values.shape)
     place = (tx, rx, float(antennas.reference_range[p]))
     same = [i for i, name in enumerate(polarizations) if name[0] == name[1]]
-    for j, f in enumerate(frequencies.tolist()):
-        a = part.amplitudes * inside * view.weights.weights(places, p, f)
-        values[same, j] = exact_echo(places, a, frequencies[j : j + 1], *place)[0]
-        powers[same, j] = (np.abs(a) ** 2).sum()
+    # all at once where amplitudes are the same at all frequencies: paths to the points take the longest
+    bands = np.arange(len(frequencies))[:, None] if view.weights.varies_over_band else np.arange(len(frequencies))[None]
+    for band in bands:
+        a = part.amplitudes * inside * view.weights.weights(places, p, float(frequencies[band[0]]))
+        values[np.ix_(same, band)] = exact_echo(places, a, frequencies[band], *place)
+        powers[np.ix_(same, band)] = (np.abs(a) ** 2).sum()
     return values, powers
 
 
