@@ -76,7 +76,7 @@ def forecast_of(
     words = planned.channels.words(planned.method, estimate.words)  # type: ignore[arg-type]
     words |= {"contributions": estimate.contributions, "spectral_echo": _spectral(task, work, seconds)}
     return Forecast(
-        method="pulse by pulse",
+        method="factorized" if words.get("method") == "factorized" else "pulse by pulse",
         plan=words,
         seconds=seconds,
         bytes=bytes_of(shape),

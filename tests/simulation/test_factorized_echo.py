@@ -301,7 +301,7 @@ def test_the_forecast_of_factorised_echoes_is_that_of_their_run(device):
     arguments = cloud(40_000), CHIRP, trajectory(line(1000))
     forecast = sarcl.plan(sarcl.echo, *arguments, tolerance=1e-2, device=device, check=False)
     raw = forecast.run()
-    assert forecast.plan["method"] == raw.report.plan["method"] == "factorized"
+    assert forecast.method == forecast.plan["method"] == raw.report.plan["method"] == "factorized"
     assert forecast.predicted_error == raw.report.predicted_error
     assert forecast.plan["contributions"] == raw.report.contributions_done == 40_000 * 1000
     assert (sarcl.echo(*arguments, tolerance=1e-2, device=device, check=False).samples == raw.samples).all()
