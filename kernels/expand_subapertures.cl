@@ -21,6 +21,7 @@
 #include "doubleword.clh"
 #include "geometry.clh"
 #include "interp.clh"
+#include "subaperture_shift.clh"
 
 // Record of a (tile, pulse): sample, cosine, sine, then TAPS weights.
 #define N_MOVE (4 + TAPS)
@@ -39,45 +40,16 @@ typedef struct {
 __kernel void moves(moves_numbers given, __global const float *restrict pulse, __global const float *restrict larger,
                     __global const float *restrict tile, __global const int *restrict parent,
                     __global const float *restrict table, __global float *restrict out) {
-    size_t g = get_global_id(0), k = given.first + get_global_id(1), lo = (size_t)N_PULSE * given.n;
-    point x = load_point(tile, k, given.n_tiles), T = load_antenna(pulse, P_TX, g, given.n, 0), c, R, d;
-    wv tx_length = w_load(pulse + P_TR * given.n, g, lo), rx_length, r;
-    if (!FROM_CENTRE) {
-        c = load_point(larger, parent[k], given.n_larger);
-        x = difference_of(x, c);
-        T = difference_of(T, c);
-        tx_length = w_sqrt(w_dot(T, T));
-    }
-    wv delta = path_difference(T, tx_length, x, &r, &d);
-    if (BISTATIC) {
-        R = load_antenna(pulse, P_RX, g, given.n, 0);
-        rx_length = w_load(pulse + P_RR * given.n, g, lo);
-        if (!FROM_CENTRE) {
-            R = difference_of(R, c);
-            rx_length = w_sqrt(w_dot(R, R));
-        }
-        delta = mean_of(delta, path_difference(R, rx_length, x, &r, &d));
-    }
-    wv wide_cycles = w_mul(delta, w_load(pulse + P_KAPPA * given.n, g, lo));
-    wv wide_position = w_mul(delta, w_load(pulse + P_SIGMA * given.n, g, lo));
-    if (FROM_CENTRE) {
-        wide_cycles = w_add(wide_cycles, w_load(pulse + P_CYCLES * given.n, g, lo));
-        wide_position = w_add(wide_position, w_load(pulse + P_POSITION * given.n, g, lo));
-    }
-    iv unused, base;
-    fv cycles = w_split(wide_cycles, &unused);
-    fv t = w_split(wide_position, &base) - (fv)(0.5f * (TAPS - 1));
-    iv at = base + nearest_int(t);
-#if WRAP
-    at = at % WRAP;
-    at -= nearest_int(TO_FLOAT_INT(at) * (1.0f / WRAP)) * WRAP;
-#endif
+    size_t g = get_global_id(0), k = given.first + get_global_id(1);
+    point x = load_point(tile, k, given.n_tiles), c = x;
+    if (!FROM_CENTRE) c = load_point(larger, parent[k], given.n_larger);
+    subaperture_shift shift = shift_of(pulse, g, given.n, c, x);
     fv w[TAPS], sine, cosine;
-    tap_weights(t - nearest(t), table, w);
-    sincos_cycles(cycles, &sine, &cosine);
+    tap_weights(shift.z, table, w);
+    sincos_cycles(shift.cycles, &sine, &cosine);
     int sample[VW];
     float re[VW], im[VW], weight[TAPS][VW];
-    STORE(at, 0, sample);
+    STORE(shift.sample, 0, sample);
     STORE(cosine, 0, re);
     STORE(sine, 0, im);
 #pragma unroll
