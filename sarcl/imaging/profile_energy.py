@@ -250,7 +250,8 @@ class RowsInPhase:
     def ratio(self, length: int = 0) -> float:
         """Largest norm of N_m over the pixels at any d, relative to the pixels themselves, for m = -1, 0, 1.
 
-        length  L of the profiles of a plan; 0: for m = 0 alone, which stands for lines and sub-apertures too
+        length  L, samples of the profiles of a plan; 0: only the sum with m = 0, which bounds the errors of lines and
+                of sub-apertures
 
         The pixels count with the larger of their norm and that of the same contributions with random phases, as they
         do for a tolerance.

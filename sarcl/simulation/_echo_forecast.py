@@ -106,10 +106,10 @@ def _timed(task: EchoTask, planned: PlannedEchoes, prepared: SceneEchoes, work: 
     at_once = min(method.pulses(room), pulses_at_once(shape, task.options.out, room))
     if timed is not None and -(-n_pulses // at_once) * method.runs > MOST_PLANS * n_pulses:
         return Estimate(timed.error_terms, timed.words, seconds, pairs)
-    whole = Added()
+    track = Added()
     for start in range(0, n_pulses, at_once):
-        whole += method.planned(quiet, start, min(at_once, n_pulses - start))
-    return Estimate(whole.error_terms, whole.plan, seconds, pairs)
+        track += method.planned(quiet, start, min(at_once, n_pulses - start))
+    return Estimate(track.error_terms, track.plan, seconds, pairs)
 
 
 def _timed_pulses(scene: SceneEchoes, method: Method, shape: tuple[int, ...], work: EchoWork) -> Estimate:

@@ -91,9 +91,9 @@ class PreparedPoints:
 
         ToleranceUnreachable: none meets the tolerance. NotApplicable: "factorized" is asked for and not possible.
         """
-        asked = band, tolerance
-        if self._latest is None or self._latest[0] is not antennas or self._latest[1] != asked:
-            self._latest = antennas, asked, self._planned(antennas, band, tolerance)
+        key = band, tolerance
+        if self._latest is None or self._latest[0] is not antennas or self._latest[1] != key:
+            self._latest = antennas, key, self._planned(antennas, band, tolerance)
         return self._latest[2]
 
     def _planned(self, antennas: PulseGeometry, band: Band, tolerance: float) -> PointPlan:
