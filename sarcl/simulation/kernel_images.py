@@ -62,7 +62,8 @@ class PatchSamples:
         at_band = interpolator.transform(nu)
         error = np.zeros((*nu.shape, self.amplitudes.shape[-1]), np.complex128)
         for m in IMAGES:
-            image = self.phasors @ (_phasors(m * rate * self.delays)[..., None] * self.amplitudes)
+            waves = _phasors(m * rate * self.delays)[..., None] * self.amplitudes
+            image = np.einsum("pfk,pka->pfa", self.phasors, waves)  # not by BLAS, whose threads wait for one another
             error += (interpolator.transform(nu + m) / at_band)[..., None] * image
         return SAFETY * float(np.sqrt((np.abs(error) ** 2).sum() / power))
 
