@@ -34,13 +34,13 @@ gpu-static:  ## compile every kernel for GPUs that are not here, and compare wit
 	@PYTHON='$(PYTHON)' sh .ci/setup.sh gpu-static gpu-static
 	@.venv/bin/python tests/gpu_static/run.py $(ARGS)
 
-bench: ready  ## run time against the error achieved; peers with ARGS='--peer-python PATH'
-	@.venv/bin/sarcl bench backproject $(ARGS)
+bench: ready  ## run time of every verb against the error achieved; images beside peers: ARGS='backproject --peer-python PATH'
+	@.venv/bin/sarcl bench $(ARGS)
 
 autofocus-trial: ready  ## autofocus on 200 random correct scenes, 200 with errors, 200 arms; bench/results/trials/autofocus.json
 	@.venv/bin/python bench/autofocus_trial.py --json bench/results/trials/autofocus.json $(ARGS)
 
-results: ready  ## docs/guide/results.md and results_echoes.md from bench/results/*.json
+results: ready  ## the pages of results in docs/guide from bench/results/*.json
 	@.venv/bin/python bench/report.py
 
 architecture: ready  ## the drawing and the table of docs/developers/architecture.md, from the imports

@@ -39,7 +39,7 @@ def main() -> None:
     """Measure, print the tables, and write the JSON file."""
     import channels_page
 
-    from sarcl.bench import backproject
+    from sarcl.bench import documents
     from sarcl.opencl.choose_device import open_device
 
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -47,16 +47,16 @@ def main() -> None:
     parser.add_argument("--device", default=None)
     parser.add_argument("--json", type=Path)
     args = parser.parse_args()
-    document = backproject.header([open_device(args.device)])
+    document = documents.header([open_device(args.device)])
     document |= {"kind": "channels", "pulses": PULSES, "growth": [], "one": [], "many": []}
     for name, part in (("growth", growth), ("one", one), ("many", many)):
         document[name] = part(args)
         if args.json:  # what comes later may fail
-            backproject.write(document, args.json)
-    document["machine"]["load"] += backproject.load()
+            documents.write(document, args.json)
+    document["machine"]["load"] += documents.load()
     print(channels_page.section("channels", document))
     if args.json:
-        backproject.write(document, args.json)
+        documents.write(document, args.json)
 
 
 def growth(args: argparse.Namespace) -> list[Row]:

@@ -56,7 +56,7 @@ def main() -> None:
     """Measure, print the tables, and write the JSON file."""
     import echo_page
 
-    from sarcl.bench import backproject
+    from sarcl.bench import documents
     from sarcl.opencl.choose_device import open_device
 
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -68,13 +68,13 @@ def main() -> None:
     parser.add_argument("--peer-python")
     parser.add_argument("--json", type=Path)
     args = parser.parse_args()
-    document = backproject.header([open_device(args.device)])
+    document = documents.header([open_device(args.device)])
     document |= {"kind": "echo", "points": args.points, "pulses": args.pulses}
     document |= {"spread": [], "whole": [], "scenes": []}
 
     def keep() -> None:  # what comes later may fail
         if args.json:
-            backproject.write(document, args.json)
+            documents.write(document, args.json)
 
     document["spread"] = spread(args, document)
     keep()
@@ -82,7 +82,7 @@ def main() -> None:
     keep()
     if args.scenes:
         document["scenes"] = scenes(args.device)
-    document["machine"]["load"] += backproject.load()
+    document["machine"]["load"] += documents.load()
     print(echo_page.section("echo", document))
     keep()
 

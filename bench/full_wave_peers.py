@@ -43,11 +43,11 @@ def main() -> None:
     parser.add_argument("--json", type=Path)
     asked = parser.parse_args()
 
-    from sarcl.bench import backproject
+    from sarcl.bench import documents
     from sarcl.opencl.choose_device import open_device
 
     device = open_device(None)
-    document = backproject.header([device])
+    document = documents.header([device])
     names = [name for name in STEPS if asked.opencl or "OpenCL" not in name]
     n_cells = asked.cells**2 * (-(-asked.cells // 16) * 16)
     ours = Ours(device, asked.cells)
@@ -67,10 +67,10 @@ def main() -> None:
         "rounds": asked.rounds, "resting": ours.resting, "peers": [about(asked.peer)],
         "rates": rates,
     }  # fmt: skip
-    document["machine"]["load"] += backproject.load()
+    document["machine"]["load"] += documents.load()
     print(full_wave_page.section("full wave", document))
     if asked.json:
-        backproject.write(document, asked.json)
+        documents.write(document, asked.json)
 
 
 class Ours:

@@ -1,4 +1,4 @@
-"""Write docs/guide/results.md and results_echoes.md, plots and README.md's table from bench/results/*.json.
+"""Write the pages of results in docs/guide, their plots and README.md's table from bench/results/*.json.
 
 python bench/report.py
 """
@@ -15,17 +15,25 @@ import echo_page
 import full_wave_page
 import spaceborne_page
 
-from sarcl.bench import pareto, ratios, tables
-from sarcl.bench.backproject import FORMAT
+from sarcl.bench import pareto, ratios, tables, verb_pictures
+from sarcl.bench.documents import FORMAT, slug
 
 ROOT = Path(__file__).parents[1]
 WRITTEN_BY = """`make results` writes this page from the JSON files under bench/results; `make bench` measures your
 machine. How the figures are measured: [benchmarks](../developers/benchmarks.md).
 """
-IMAGES = f"""# Results
+VERBS = f"""# Results
 
-Run time of images against achieved error, beside other programs; [echoes and full-wave fields](results_echoes.md) have
-a page of their own.
+Every verb: run time against achieved error, and against the size of its task. Pages of their own show
+[images beside other programs](results_images.md) and [echoes and full-wave fields](results_echoes.md).
+
+{WRITTEN_BY}
+{tables.VERBS_EXPLAINED}
+
+"""
+IMAGES = f"""# Results: images
+
+Run time of images against achieved error, beside other programs; [every verb](results.md) by itself.
 
 {WRITTEN_BY}
 ## How to read this
@@ -35,8 +43,8 @@ a page of their own.
 """
 ECHOES = f"""# Results: echoes
 
-Run time of echoes, channels of arrays, a pass from orbit and full-wave fields; [images](results.md) have a page of
-their own.
+Run time of echoes, channels of arrays, a pass from orbit and full-wave fields; [every verb](results.md) by itself, and
+[images](results_images.md) beside other programs.
 
 {WRITTEN_BY}
 """
@@ -49,8 +57,8 @@ README_HEAD = ["tolerance", "error achieved", "predicted", "seconds", "Gbp/s", "
 
 
 def write(folder: Path, docs: Path, readme: Path | None = None) -> list[Path]:
-    """Write results.md and results_echoes.md into the folder `docs`, a picture results-NAME.png beside them for each
-    results/NAME.json of images, and the README's table.
+    """Write results.md (verbs), results_images.md and results_echoes.md into the folder `docs`, a picture
+    results-NAME.png beside them for each results/NAME.json of images and each verb, and the README's table.
 
     Returns the files written. ValueError where there is no JSON file, or one of another format.
     """
@@ -58,8 +66,11 @@ def write(folder: Path, docs: Path, readme: Path | None = None) -> list[Path]:
     if not documents:
         raise ValueError(f"{folder} holds no .json; make one: sarcl bench backproject --json {folder}/1.json")
     written = []
-    pages = {"results.md": IMAGES, "results_echoes.md": ECHOES}
+    pages = {"results.md": VERBS, "results_images.md": IMAGES, "results_echoes.md": ECHOES}
     for name, document in documents.items():
+        if document.get("kind") == "verbs":
+            pages["results.md"] += verbs_section(document, docs, written)
+            continue
         if document.get("kind") in OTHER:
             pages["results_echoes.md"] += OTHER[document["kind"]](name, document)
             continue
@@ -68,12 +79,12 @@ def write(folder: Path, docs: Path, readme: Path | None = None) -> list[Path]:
             picture = docs / f"results-{name}.png"
             picture.write_bytes(pareto.picture(document["cases"]))
             written.append(picture)
-        pages["results.md"] += section(name, document, drawn)
+        pages["results_images.md"] += section(name, document, drawn)
     for page, text in pages.items():
         (docs / page).write_text(text.rstrip("\n") + "\n")
         written.append(docs / page)
     if readme is not None:
-        block = next((readme_table(d) for d in documents.values() if "cases" in d), "")
+        block = next((readme_table(d) for d in documents.values() if "cases" in d and "kind" not in d), "")
         text = readme.read_text()
         new = re.sub(
             r"<!-- results -->.*?<!-- end of results -->",
@@ -120,6 +131,24 @@ def section(name: str, document: dict[str, Any], drawn: bool) -> str:
     if growth:
         text += f"### {name}: cost against size\n\n{tables.markdown(tables.GROWTH_HEAD, growth)}\n"
     return text
+
+
+def verbs_section(document: dict[str, Any], docs: Path, written: list[Path]) -> str:
+    """The pictures of all verbs, the machine, and a table for each verb; `written` gets the pictures' paths."""
+    tasks: dict[str, list[ratios.Result]] = {}
+    for case in document["cases"]:
+        tasks.setdefault(case["scene"], []).append(case)
+    pictures, text = "", "".join(f"- {line}\n" for line in tables.machine_text(document)) + "\n"
+    for scene, cases in tasks.items():
+        picture = docs / f"results-{slug(scene)}.png"
+        picture.write_bytes(verb_pictures.picture(cases))
+        written.append(picture)
+        pictures += f"![{scene}: CPU seconds against achieved error and size]({picture.name})\n\n"
+        lines = [line for case in cases for line in tables.verb_body(case)]
+        text += f"## {scene}\n\n{cases[0]['words']}. Contributions: {cases[0]['unit']}.\n\n"
+        text += tables.markdown(tables.VERB_HEAD, lines)
+        text += "".join(f"- {line}\n" for case in cases for line in tables.missing(case)) + "\n"
+    return pictures + text
 
 
 def _plans(case: ratios.Result) -> str:

@@ -37,7 +37,7 @@ Row = dict[str, Any]
 
 def main() -> None:
     """Measure, print the table, and write the JSON file and the pictures."""
-    from sarcl.bench import backproject
+    from sarcl.bench import documents
     from sarcl.opencl.choose_device import open_device
 
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -46,15 +46,15 @@ def main() -> None:
     parser.add_argument("--pictures", type=Path)
     parser.add_argument("--device")
     asked = parser.parse_args()
-    document = backproject.header([open_device(asked.device)])
+    document = documents.header([open_device(asked.device)])
     made = Run(QUICK if asked.quick else FULL, asked.device)
     document |= made.document()
-    document["machine"]["load"] += backproject.load()
+    document["machine"]["load"] += documents.load()
     print(spaceborne_page.section("spaceborne", document))
     if asked.pictures:
         made.draw(asked.pictures)
     if asked.json:
-        backproject.write(document, asked.json)
+        documents.write(document, asked.json)
 
 
 class Run:

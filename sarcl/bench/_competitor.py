@@ -23,11 +23,13 @@ class Reading:
              "kernel": the part in the device's kernels, where it is known;
              "cpu": CPU seconds of all processors, of sarcl's call and of a peer's form; other programs hardly change it
     notes    what the program reports: plan, predicted error
+    errors   error and error relative to |I|, of a task whose values are not those of a case's pixels
     """
 
     values: np.ndarray
     seconds: Mapping[str, float]
     notes: Mapping[str, Any] = field(default_factory=dict)
+    errors: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, eq=False)

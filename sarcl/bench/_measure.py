@@ -12,8 +12,9 @@ from ..base.errors import ToleranceMissed, ToleranceUnreachable
 from . import _wait_idle
 from ._cases import BenchCase
 from ._competitor import Absent, Competitor, Reading
+from ._verb_cases import VerbCase
 
-WARM = 10.0  # s; a first run counts only if it is longer, because it may build kernels (about a second)
+WARM = 10.0  # s; a first run counts only if it is longer, because it may build kernels, and if it checks nothing
 PROCESSES = 3  # runs of a whole process, at most
 LONG = 20.0  # s; where a call is longer, a whole process takes about as long and is not timed
 TELLING = 0.5  # s; the pace of a shorter call does not predict larger cases
@@ -28,7 +29,7 @@ def alternate(*groups: Sequence[Competitor]) -> list[Competitor]:
 
 
 def measure(
-    case: BenchCase,
+    case: BenchCase | VerbCase,
     competitors: Sequence[Competitor],
     *,
     repeats: int,
@@ -87,7 +88,7 @@ def _spent(row: Row, share: float, repeats: int, limit: float) -> bool:
     return len(runs) >= repeats or (bool(runs) and (sum(runs) + min(runs)) * share > limit)
 
 
-def _take(row: Row, competitor: Competitor, case: BenchCase, limit: float, paces: Paces, warm: bool) -> None:
+def _take(row: Row, competitor: Competitor, case: BenchCase | VerbCase, limit: float, paces: Paces, warm: bool) -> None:
     """Run once and record it in the row."""
     expected = case.pairs * paces.get(_key(row), 0.0)
     if warm and expected > limit:
@@ -95,7 +96,7 @@ def _take(row: Row, competitor: Competitor, case: BenchCase, limit: float, paces
     reading = competitor.run()
     if warm:
         _judge(row, competitor, case, reading)
-        if reading.seconds["call"] < WARM:
+        if reading.errors is not None or reading.seconds["call"] < WARM:
             return
     for name, value in reading.seconds.items():
         row["seconds"].setdefault(name, []).append(value / competitor.share)
@@ -115,14 +116,17 @@ def _take_process(row: Row, competitor: Competitor) -> None:
         row["no_process"] = str(exc)
 
 
-def _judge(row: Row, competitor: Competitor, case: BenchCase, reading: Reading) -> None:
+def _judge(row: Row, competitor: Competitor, case: BenchCase | VerbCase, reading: Reading) -> None:
     """Record the errors of a run and what it reports."""
-    if competitor.check is None:
+    if reading.errors is not None:
+        row["error"], row["error_of_image"] = reading.errors
+    elif competitor.check is None:
+        assert isinstance(case, BenchCase)  # readings of other cases have their errors
         row["error"], row["error_of_image"] = case.errors(reading.values)
     else:
         exact, norm = competitor.check
         wrong, own = float(np.linalg.norm(reading.values - exact)), float(np.linalg.norm(exact))
         row["error"], row["error_of_image"] = wrong / max(own, norm), wrong / own
     if not np.isfinite(row["error"]):
-        raise Absent("its image holds NaN or Inf")
+        raise Absent("its result holds NaN or Inf")
     row.update(reading.notes)

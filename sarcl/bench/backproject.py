@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import functools
-import json
-import os
-import platform
 import tempfile
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
@@ -15,21 +12,15 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from ..base.threads import threads
 from ..base.validation import choice, count, number
-from ..base.version import __version__
 from ..imaging.choose_method import METHODS
-from ..opencl import device_list
-from ..opencl.choose_device import open_device
-from ..opencl.device import Device, DeviceChoice
+from ..opencl.device import DeviceChoice
 from . import _baseline, _cases, _peers, _run_sarcl, tables
 from ._competitor import Absent, Competitor
 from ._measure import Paces, alternate, measure
+from .documents import Document, header, load, opened_devices
 
 TOLERANCES = (1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 1e-5, 1e-6)
-FORMAT = 2  # version of the document
-FACTS = ("index", "name", "platform", "driver", "kind", "fp64", "units")  # of a device, in a document
-Document = dict[str, Any]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,7 +84,7 @@ def run(
     options        those of a Setting. ValueError for what does not fit, before the work; NoDeviceError.
     """
     setting = Setting(**options)
-    opened = _opened_devices(setting.devices, setting.no_fp64)
+    opened = opened_devices(setting.devices, setting.no_fp64)
     document: Document = {**header(opened), "cases": []}
     with ExitStack() as stack:
         peer = None
@@ -158,62 +149,3 @@ def _others(case: _cases.BenchCase, folder: Path, peer: _peers.Peer | None, sett
 
             others += [Competitor(peer.name, backend, method, "any", gone) for method in methods]
     return others
-
-
-def _opened_devices(devices: Sequence[DeviceChoice | None] | None, no_fp64: bool) -> list[Device]:
-    """The devices, all that work by default, and with no_fp64 a twin without float64 of each that has it."""
-    if not devices:
-        devices = [info.index for info in device_list.devices() if info.works] or [None]
-    opened = [open_device(device) for device in dict.fromkeys(devices)]
-    return opened + [device.without_fp64() for device in opened if no_fp64 and device.info.fp64]
-
-
-def header(devices: Sequence[Device]) -> Document:
-    """The first entries of every document: machine, devices, an empty list of peers."""
-    return {
-        "format": FORMAT,
-        "machine": _machine(),
-        "devices": [{name: getattr(d.info, name) for name in FACTS} for d in devices],
-        "peers": [],
-    }
-
-
-def load() -> list[float]:
-    """Load average of the last minute, one value; NaN where the system does not say."""
-    return [os.getloadavg()[0]] if hasattr(os, "getloadavg") else [float("nan")]
-
-
-def _machine() -> dict[str, Any]:
-    processor = platform.processor()
-    try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
-        processor = next(line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
-    except (OSError, StopIteration):
-        pass
-    return {
-        "processor": processor or platform.machine(),
-        "processors": os.cpu_count(),
-        "threads": threads(),
-        "system": platform.system(),
-        "python": platform.python_version(),
-        "numpy": np.__version__,
-        "sarcl": __version__,
-        "load": load(),
-    }
-
-
-def write(document: Document, path: Path) -> None:
-    """The document as a JSON file that appears whole."""
-    from ..io import output_paths
-
-    with output_paths.atomic(path) as part:
-        part.write_text(json.dumps(document, indent=1, default=_plain) + "\n")
-
-
-def _plain(value: object) -> object:
-    """NumPy numbers of a plan as plain numbers, lists or text."""
-    if isinstance(value, np.generic):
-        return value.item()
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    return str(value)

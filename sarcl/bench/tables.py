@@ -11,6 +11,12 @@ Cells = list[list[str]]
 HEAD = ", method, setting, error, of |I|, form s, median, call s, kernel s, process s, cpu s, Gbp/s".split(", ")
 MATCH_HEAD = ["peer", "its error", "Gbp/s", "sarcl", "error", "Gbp/s", "form", "median form", "call", "process", "cpu"]
 GROWTH_HEAD = ["", "method", "setting", "error at most", "n", "form s", "form", "cpu"]
+VERB_HEAD = ["", "method", "n", "tolerance", "error", "predicted", "s", "median", "cpu s", "M/s"]
+VERBS_EXPLAINED = (
+    "error: relative to the exact result, as docs/theory/accuracy.md defines it, from a run that is not timed. s: the "
+    "shortest of the whole calls, planning included, kernels built. cpu: CPU seconds of all processors, which other "
+    "programs on the machine hardly affect. M/s: millions of contributions per second, as each task counts them."
+)
 EXPLAINED = (
     "error: relative L2 error against the exact sum, as defined in docs/theory/accuracy.md; of |I|: the same relative "
     "to the norm of the image alone. form: time from data in memory to the finished image, without the preparation "
@@ -24,6 +30,8 @@ EXPLAINED = (
 
 def title(result: ratios.Result) -> str:
     """Description of a case, one line."""
+    if "words" in result:
+        return f"{result['scene']}, n = {result['n']}: {result['words']}"
     return (
         f"{result['scene']}, {result['data']}, n = {result['n']}: {WORDS[result['scene']]}; n pulses of n samples on "
         f"n x n pixels"
@@ -48,6 +56,23 @@ def body(result: ratios.Result) -> Cells:
             _seconds(ratios.middle(row)),
             *(_seconds(ratios.best(row, key)) for key in ("call", "kernel", "process", "cpu")),
             f"{ratios.rate(result, row):.3g}",
+        ]
+        for row in ratios.ran(result)
+    ]
+
+
+def verb_body(result: ratios.Result) -> Cells:
+    """A line for every row of a verb that ran, under VERB_HEAD."""
+    return [
+        [
+            name(row),
+            row["method"],
+            str(result["n"]),
+            row["setting"],
+            f"{row['error']:.1e}",
+            f"{row['predicted']:.1e}" if "predicted" in row else "",
+            *(_seconds(s) for s in (ratios.best(row), ratios.middle(row), ratios.best(row, "cpu"))),
+            f"{1e3 * ratios.rate(result, row):.3g}",
         ]
         for row in ratios.ran(result)
     ]
@@ -84,7 +109,7 @@ def growth_body(results: list[ratios.Result]) -> Cells:
     return [
         [
             name(entry),
-            f"{entry['method']}, {entry['scene']} {entry['data']}",
+            ", ".join(filter(None, (entry["method"], f"{entry['scene']} {entry['data']}".strip()))),
             entry["setting"],
             f"{entry['error']:.1e}",
             ", ".join(str(n) for n in entry["sizes"]),
@@ -109,7 +134,8 @@ def missing(result: ratios.Result) -> list[str]:
 
 def text(result: ratios.Result) -> str:
     """The tables of a case for the terminal."""
-    parts = [title(result), _aligned(HEAD, body(result)), *missing(result)]
+    table = _aligned(VERB_HEAD, verb_body(result)) if "words" in result else _aligned(HEAD, body(result))
+    parts = [title(result), table, *missing(result)]
     lines = match_body(result)
     if lines:
         parts += ["", "ratios, peer's seconds over sarcl's, at equal or smaller error:", _aligned(MATCH_HEAD, lines)]

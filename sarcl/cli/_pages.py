@@ -9,6 +9,14 @@ from typing import Any
 from ..io import formats
 from ._job import Job
 
+# Names of arguments of the command line that each kind of benchmark takes
+BENCH = {
+    "verbs": ("verbs", "quick", "sizes", "tolerances", "devices", "repeats", "limit", "patience"),
+    "backproject": (
+        "scenes", "data", "sizes", "tolerances", "methods", "devices", "peer_python", "peer_backend", "repeats",
+        "pixels", "limit", "patience",
+    ),
+}  # fmt: skip
 SECTION_BYTES = 40_000  # of a section of a page with one figure: the least room that a page needs for each
 
 
@@ -86,32 +94,52 @@ def papers(args: argparse.Namespace, job: Job) -> int:
 
 
 def bench(args: argparse.Namespace, job: Job) -> int:
-    """Measure run time against achieved error: tables and, if asked for, JSON and a plot."""
-    from ..bench import backproject
+    """Measure run time against achieved error: tables and, if asked for, JSON and plots."""
+    from ..bench import backproject, documents, verbs
     from ..figures import plots
-    from ..io import output_paths
 
     if args.json is not None:
         job.expect_named([args.json], [formats.Format((".json",))], [])
-    if args.picture is not None:
-        job.expect_named([args.picture], formats.writing("picture"), [])
+    options = {name: value for name in BENCH[args.what] if (value := getattr(args, name)) is not None}
+    for name in sorted({*BENCH["verbs"], *BENCH["backproject"]} - set(BENCH[args.what])):
+        if getattr(args, name) not in (None, False):
+            raise ValueError(f"--{name.replace('_', '-')} is not for sarcl bench {args.what}")
+    pictures = {} if args.picture is None else _bench_pictures(args.what, args.picture, options)
+    if pictures:
+        job.expect_named([str(path) for path in pictures], formats.writing("picture"), [])
         plots.require("--picture")
-    names = "scenes data sizes tolerances methods devices peer_python peer_backend repeats pixels limit patience"
-    given = {name: value for name in names.split() if (value := getattr(args, name)) is not None}
+    if args.what == "backproject":
+        options["with_peers"] = not args.no_peers
 
-    def keep(document: dict[str, Any]) -> None:
+    def keep(document: documents.Document) -> None:
         if args.json is not None:
-            backproject.write(document, Path(args.json))
+            documents.write(document, Path(args.json))
 
-    document = backproject.run(
-        **given, no_fp64=args.no_fp64, with_peers=not args.no_peers, say=job.say, progress=job.progress, keep=keep
-    )
-    if args.picture is not None:
-        from ..bench.pareto import picture
-
-        with output_paths.atomic(args.picture) as part:
-            part.write_bytes(picture(document["cases"]))
+    room = {"verbs": verbs, "backproject": backproject}[args.what]
+    document = room.run(**options, no_fp64=args.no_fp64, say=job.say, progress=job.progress, keep=keep)
+    for path, scenes in pictures.items():
+        _draw(path, [case for case in document["cases"] if not scenes or case["scene"] == scenes])
     return 0
+
+
+def _bench_pictures(what: str, picture: str, options: dict[str, Any]) -> dict[Path, str]:
+    """Paths of the pictures, and the task that each is of; "" for the one of all images."""
+    from ..bench.documents import slug
+    from ..bench.verbs import TASKS
+
+    path = Path(picture)
+    if what == "backproject":
+        return {path: ""}
+    return {path.with_stem(f"{path.stem}-{slug(name)}"): name for name in options.get("verbs", TASKS)}
+
+
+def _draw(path: Path, cases: list[dict[str, Any]]) -> None:
+    from ..bench import pareto, verb_pictures
+    from ..io import output_paths
+
+    picture = verb_pictures.picture if "words" in cases[0] else pareto.picture
+    with output_paths.atomic(path) as part:
+        part.write_bytes(picture(cases))
 
 
 def _write(path: str | Path, text: str) -> None:

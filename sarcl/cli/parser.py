@@ -209,15 +209,19 @@ def _picture(p: argparse.ArgumentParser) -> None:
 
 
 def _bench(p: argparse.ArgumentParser) -> None:
-    _add(p, "what", "what to measure", choices=["backproject"], default="backproject", nargs="?")
+    text = 'every verb on tasks of its own (default), or images beside peers ("backproject")'
+    _add(p, "what", text, choices=["verbs", "backproject"], default="verbs", nargs="?")
     _add(p, "--json FILE", "write all measurements, .json")
-    _add(p, "--picture FILE", "plot rate against error, .png (needs the extra plots)")
+    text = "plot run time against error, .png: of verbs, a picture for each, FILE-VERB.png (needs the extra plots)"
+    _add(p, "--picture FILE", text)
     what = p.add_argument_group("what is measured")
-    _add(what, "--scenes", "tracks (default both)", choices=["spotlight", "straight"], nargs="+")
-    _add(what, "--data", "default noise for spotlight, points for straight", choices=["noise", "points"])
-    _add(what, "--sizes N", "pulses, samples, image side (default 1024)", int, nargs="+")
-    _add(what, "--tolerances T", "default 1e-1 to 1e-6", float, nargs="+")
-    _add(what, "--methods", "default direct factorized", choices=["direct", "factorized", "auto"], nargs="+")
+    _flag(what, "--quick", "verbs: small tasks, few tolerances, one run; at most 3 CPU minutes")
+    _add(what, "--verbs NAME", "verbs: names of tasks, such as 'echo of points' (default all)", nargs="+")
+    _add(what, "--scenes", "images: tracks (default both)", choices=["spotlight", "straight"], nargs="+")
+    _add(what, "--data", "images: default noise for spotlight, points for straight", choices=["noise", "points"])
+    _add(what, "--sizes N", "of the tasks; of images: pulses, samples, image side (default 1024)", int, nargs="+")
+    _add(what, "--tolerances T", "of images: default 1e-1 to 1e-6", float, nargs="+")
+    _add(what, "--methods", "images: default direct factorized", choices=["direct", "factorized", "auto"], nargs="+")
     _add(what, "--devices NAME", "as --device elsewhere (default all that work)", nargs="+")
     _flag(what, "--no-fp64", "measure each device again without float64")
     peer = p.add_argument_group("peers")
@@ -225,7 +229,7 @@ def _bench(p: argparse.ArgumentParser) -> None:
     _add(peer, "--peer-backend", "fastsar's (default cpu)", choices=["cpu", "cuda", "jax", "auto"])
     _flag(peer, "--no-peers", "measure sarcl alone, without NumPy and fastsar")
     how = p.add_argument_group("how")
-    _add(how, "--repeats K", "runs of each, alternating (default 5)", int)
+    _add(how, "--repeats K", "runs of each, alternating (default 3, of images 5)", int)
     _add(how, "--pixels K", "pixels checked against the exact sum, at least 256 (default 1024)", int)
     _add(how, "--limit S", "leave out runs that would take longer, s (default 120)", float)
     _add(how, "--patience S", "wait up to so long for an idle machine, s (default 0)", float)

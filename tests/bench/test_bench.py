@@ -13,7 +13,7 @@ import report as page
 
 import sarcl
 from sarcl.bench import _baseline as numpy_baseline
-from sarcl.bench import _cases, _measure, _peers, _wait_idle, exact, pareto, ratios, tables
+from sarcl.bench import _cases, _measure, _peers, _wait_idle, documents, exact, pareto, ratios, tables
 from sarcl.bench import backproject as bench
 from sarcl.bench._competitor import Absent, Competitor, Reading
 from sarcl.cli import parser
@@ -266,7 +266,7 @@ def test_sarcl_and_a_peer_in_one_run(stand_in, tmp_path):
     assert all(r["absent"] == "ValueError: 16 is too much" for r in theirs if r not in right)
     text = "\n".join(lines)
     assert "stand-in 1" in text and "16 is too much" in text and "-40.0 dB" in text
-    bench.write(document, tmp_path / "x.json")
+    documents.write(document, tmp_path / "x.json")
     assert json.loads((tmp_path / "x.json").read_text())["cases"][0]["rows"][0]["who"] == "sarcl"
 
 
@@ -323,7 +323,7 @@ def document_of(*cases_):
     }
     device = {"index": 0, "name": "d", "platform": "p", "driver": "1", "kind": "cpu", "fp64": True}
     peer = {"name": "fastsar", "absent": "not here"}
-    return {"format": bench.FORMAT, "machine": machine, "devices": [device], "peers": [peer], "cases": list(cases_)}
+    return {"format": documents.FORMAT, "machine": machine, "devices": [device], "peers": [peer], "cases": list(cases_)}
 
 
 def test_the_picture_has_a_panel_for_each_case_and_marks_the_figures(monkeypatch):
@@ -354,12 +354,12 @@ def test_the_page_is_made_from_the_files(tmp_path):
     results.mkdir(), docs.mkdir()
     rows = row("sarcl", 1.5e-3, 1e-6, setting="1e-02"), row("peer", 2e-3, 3e-6, setting="linear, 8 x")
     rows[0]["seconds"]["kernel"] = [1e-6]
-    bench.write(document_of(result(*rows), result(*rows, n=32)), results / "a.json")
+    documents.write(document_of(result(*rows), result(*rows, n=32)), results / "a.json")
     readme = tmp_path / "README.md"
     readme.write_text("before\n<!-- results -->\nold\n<!-- end of results -->\nafter\n")
     written = page.write(results, docs, readme)
-    assert [p.name for p in written] == ["results-a.png", "results.md", "results_echoes.md", "README.md"]
-    text = (docs / "results.md").read_text()
+    assert [p.name for p in written] == ["results-a.png", "results.md", "results_images.md", "results_echoes.md", "README.md"]
+    text = (docs / "results_images.md").read_text()
     for words in ("results-a.png", "1.5e-03", "3.00 x", "not here", "cost against size", "taps 2"):
         assert words in text
     assert "old" not in readme.read_text() and "| 1e-02 | 1.5e-03 |" in readme.read_text()
@@ -405,8 +405,6 @@ def test_bad_options_end_in_one_line(options, said, capsys):
 
 def test_echo_documents_become_tables(tmp_path):
     """A document of bench/echo.py: spreading, whole echoes and scenes."""
-    from sarcl.bench import backproject
-
     spread = [
         {
             "name": "sarcl, delays from geometry", "setting": "1e-03", "seconds": [0.5, 0.4], "error": 2e-4,
@@ -420,11 +418,11 @@ def test_echo_documents_become_tables(tmp_path):
     long = [
         {"name": "SARAS", "setting": "1e-02", "seconds": [9.0], "pairs": 5e6, "error": 1e-3, "samples": 7, "vax": 490}
     ]
-    document = backproject.header([]) | {
+    document = documents.header([]) | {
         "kind": "echo", "points": 1000, "pulses": 40000, "samples": 7, "spread": spread, "whole": whole, "scenes": long,
     }  # fmt: skip
     (tmp_path / "results").mkdir()
-    backproject.write(document, tmp_path / "results" / "2-echo.json")
+    documents.write(document, tmp_path / "results" / "2-echo.json")
     page.write(tmp_path / "results", tmp_path)
     text = (tmp_path / "results_echoes.md").read_text()
     assert "| sarcl, delays from geometry | 1e-03 | 2.0e-04 | 0.4 | 100 | 80 | 50 |" in text
@@ -435,16 +433,14 @@ def test_echo_documents_become_tables(tmp_path):
 
 def test_documents_of_channels_become_tables(tmp_path):
     """A document of bench/channels.py: ways of the same channels beside one another."""
-    from sarcl.bench import backproject
-
     row = {"scene": "points", "n": 45, "contributions": 9_000_000_000, "error": 2e-5, "predicted": 8e-4, "visited": 1}
     rows = [
         row | {"way": "one call", "seconds": [3.0, 2.0, 4.0], "positions": 3},
         row | {"way": "one call per channel", "seconds": [9.0, 8.0, 7.0], "positions": None},
     ]
-    document = backproject.header([]) | {"kind": "channels", "pulses": 101, "growth": rows, "one": [], "many": rows[:1]}
+    document = documents.header([]) | {"kind": "channels", "pulses": 101, "growth": rows, "one": [], "many": rows[:1]}
     (tmp_path / "results").mkdir()
-    backproject.write(document, tmp_path / "results" / "4-channels.json")
+    documents.write(document, tmp_path / "results" / "4-channels.json")
     page.write(tmp_path / "results", tmp_path)
     text = (tmp_path / "results_echoes.md").read_text()
     assert "| points | 45 | one call, 3 positions | 2.0e-05 | 8.0e-04 | 2 | 3 | 4.5 | 1.00 |" in text
@@ -454,19 +450,17 @@ def test_documents_of_channels_become_tables(tmp_path):
 
 def test_documents_of_full_wave_runs_become_tables(tmp_path):
     """A document of bench/full_wave_peers.py: rates of the solvers, and ratios."""
-    from sarcl.bench import backproject
-
     peer = {"name": "gprMax", "version": "4.0.1", "python": "3.11.7", "backend": "OpenMP, OpenCL"}
     rates = {
         "sarcl": {"Mcells/s": 450.0, "Mcells per two CPU s": 500.0},
         "gprMax OpenMP": {"Mcells/s": 150.0, "Mcells per two CPU s": 125.0},
     }
-    document = backproject.header([]) | {
+    document = documents.header([]) | {
         "kind": "full wave", "cells": [200, 200, 208], "frequencies": 50, "rounds": 2, "resting": 0.185,
         "peers": [peer], "rates": rates,
     }  # fmt: skip
     (tmp_path / "results").mkdir()
-    backproject.write(document, tmp_path / "results" / "6-full-wave.json")
+    documents.write(document, tmp_path / "results" / "6-full-wave.json")
     page.write(tmp_path / "results", tmp_path)
     text = (tmp_path / "results_echoes.md").read_text()
     assert "200 x 200 x 208 cells, 50 frequencies; 18% of the cells" in text and "- peer gprMax 4.0.1" in text
@@ -475,19 +469,17 @@ def test_documents_of_full_wave_runs_become_tables(tmp_path):
 
 def test_documents_of_a_spaceborne_pass_become_tables(tmp_path):
     """A document of bench/spaceborne.py: cost of the stages, theory beside both images."""
-    from sarcl.bench import backproject
-
     rows = [
         {"item": "width", "unit": "m", "theory": 2.2, "fast": 2.21, "slow": 2.19, "digits": ".2f"},
         {"item": "rate", "unit": "", "theory": -1848.0, "fast": -1848.3, "slow": None, "digits": ".1f"},
     ]
-    document = backproject.header([]) | {
+    document = documents.header([]) | {
         "kind": "spaceborne", "swath": [5000.0, 1500.0], "pulses": 1500, "samples": 7, "facets": 2_400_000,
         "incidence_deg": 38.7, "slant_km": 980.0, "rows": rows, "cpu": {"raw data": 155.4, "backprojection": 17.0},
         "errors": {"raw data": 2.3e-3, "backprojection": None}, "pixels": {"fast": [4, 5], "slow": [6, 7]},
     }  # fmt: skip
     (tmp_path / "results").mkdir()
-    backproject.write(document, tmp_path / "results" / "5-spaceborne.json")
+    documents.write(document, tmp_path / "results" / "5-spaceborne.json")
     page.write(tmp_path / "results", tmp_path)
     text = (tmp_path / "results_echoes.md").read_text()
     assert "5 x 1.5 km of ground in 2,400,000 facets" in text and "4 x 5 pixels by range-Doppler and 6 x 7" in text
