@@ -358,7 +358,13 @@ def test_the_page_is_made_from_the_files(tmp_path):
     readme = tmp_path / "README.md"
     readme.write_text("before\n<!-- results -->\nold\n<!-- end of results -->\nafter\n")
     written = page.write(results, docs, readme)
-    assert [p.name for p in written] == ["results-a.png", "results.md", "results_images.md", "results_echoes.md", "README.md"]
+    assert [p.name for p in written] == [
+        "results-a.png",
+        "results.md",
+        "results_images.md",
+        "results_echoes.md",
+        "README.md",
+    ]
     text = (docs / "results_images.md").read_text()
     for words in ("results-a.png", "1.5e-03", "3.00 x", "not here", "cost against size", "taps 2"):
         assert words in text

@@ -14,7 +14,7 @@ from ...io import sarcl_hdf5
 from ...model.phase_history import PhaseHistory
 from ..anchors import ENOUGH
 from ._formed_samples import error_terms
-from ._fullwave_task import FullwaveTask
+from ._fullwave_task import LEFT, FullwaveTask
 from ._grid_choice import SHARE
 from ._run_speed import RunSpeed, run_speed
 
@@ -59,7 +59,7 @@ def forecast_of(
         **task.losses,
         **task.motion,
     }
-    terms = error_terms(expected_error(task, anchors), task.options)
+    terms = error_terms(expected_error(task, anchors), LEFT * task.options.tolerance, task.options)
     return Forecast(
         method="full wave",
         plan=plan,

@@ -87,10 +87,13 @@ def checked_anchors(asked: object, n_pulses: int) -> str | int | np.ndarray:
     return pulses
 
 
-def error_terms(forming: float, options: FullwaveOptions) -> tuple[ErrorTerm, ...]:
-    """Terms of the error of samples: that of waveform forming alone."""
+def error_terms(forming: float, left: float, options: FullwaveOptions) -> tuple[ErrorTerm, ...]:
+    """Terms of the error of samples: waveform forming, and the part `left` of the currents that runs end before."""
     remedy = SMALLER_TOLERANCE if isinstance(options.anchors, str) else "more anchors"
-    return (ErrorTerm("waveform forming", forming, remedy),)
+    return (
+        ErrorTerm("waveform forming", forming, remedy),
+        ErrorTerm("end of runs", left, SMALLER_TOLERANCE),
+    )
 
 
 class ErrorSums:
@@ -164,7 +167,7 @@ def _report(task: FullwaveTask, sums: ErrorSums, counts: RunCounts, clock: Clock
         **task.losses,
         **task.motion,
     }
-    terms = error_terms(sums.forming_error, task.options)
+    terms = error_terms(sums.forming_error, counts.left, task.options)
     return Report(
         plan=plan,
         tolerance=task.options.tolerance,
