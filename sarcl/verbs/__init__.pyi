@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike
 from ..arrays.map_aperture import MapApertureOptions, MapKind
 from ..base.forecast import Forecast
 from ..base.types import PathLike, WritableArray
+from ..blocks.block_options import Tile
 from ..earth.elevation import ElevationModel
-from ..imaging.backproject_options import Tile
 from ..imaging.focusing_task import BeamCone
 from ..imaging.focusing_task import Skip as BackprojectSkip
 from ..model.antenna import Antenna
@@ -112,13 +112,13 @@ class BackprojectKeywords(TypedDict, total=False):
     wrap: bool
     skip: bool | Collection[BackprojectSkip]
     out: PathLike | WritableArray | None
-    resume: bool | None
-    tile: Tile | None
-    device: DeviceChoice | Sequence[DeviceChoice] | None
-    cluster: distributed.Client | None
     sum_polarizations: bool
     window: Window | None
     weights: ArrayLike | None
+    resume: bool | None
+    tile: Tile | None
+    device: DeviceChoice | None
+    cluster: distributed.Client | None
     tolerance: float
     max_bytes: float | None
     check: bool | None
@@ -254,13 +254,13 @@ def backproject(
     wrap: bool = False,
     skip: bool | Collection[BackprojectSkip] = True,
     out: PathLike | WritableArray | None = None,
-    resume: bool | None = None,
-    tile: None = None,
-    device: DeviceChoice | Sequence[DeviceChoice] | None = None,
-    cluster: distributed.Client | None = None,
     sum_polarizations: bool = False,
     window: Window | None = None,
     weights: ArrayLike | None = None,
+    resume: bool | None = None,
+    tile: None = None,
+    device: DeviceChoice | None = None,
+    cluster: distributed.Client | None = None,
     tolerance: float = 0.001,
     max_bytes: float | None = None,
     check: bool | None = None,
@@ -280,13 +280,13 @@ def backproject(
     wrap: bool = False,
     skip: bool | Collection[BackprojectSkip] = True,
     out: PathLike | WritableArray | None = None,
-    resume: bool | None = None,
-    tile: Tile | None,
-    device: DeviceChoice | Sequence[DeviceChoice] | None = None,
-    cluster: distributed.Client | None = None,
     sum_polarizations: bool = False,
     window: Window | None = None,
     weights: ArrayLike | None = None,
+    resume: bool | None = None,
+    tile: Tile | None,
+    device: DeviceChoice | None = None,
+    cluster: distributed.Client | None = None,
     tolerance: float = 0.001,
     max_bytes: float | None = None,
     check: bool | None = None,
@@ -351,13 +351,13 @@ def plan(
     wrap: bool = False,
     skip: bool | Collection[BackprojectSkip] = True,
     out: PathLike | WritableArray | None = None,
-    resume: bool | None = None,
-    tile: Tile | None = None,
-    device: DeviceChoice | Sequence[DeviceChoice] | None = None,
-    cluster: distributed.Client | None = None,
     sum_polarizations: bool = False,
     window: Window | None = None,
     weights: ArrayLike | None = None,
+    resume: bool | None = None,
+    tile: Tile | None = None,
+    device: DeviceChoice | None = None,
+    cluster: distributed.Client | None = None,
     tolerance: float = 0.001,
     max_bytes: float | None = None,
     check: bool | None = None,
