@@ -11,6 +11,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from ..base.stage_timer import Clock
+from ..opencl.device_list import DeviceInfo
 from ..opencl.failures import DeviceFailed
 from ._shares import Shares, Worker
 from .bands import Bands, Engine, FlatArray, Run, Tally
@@ -178,6 +179,12 @@ class LocalWorkers:
             stop.set()
             for thread in threads.values():
                 thread.join()
+
+
+def rates_of(infos: Sequence[DeviceInfo]) -> list[float]:
+    """Speeds of devices relative to one another, from their trials; equal where all are of one kind and driver."""
+    kinds = {(info.platform, info.name, info.kind, info.units) for info in infos}
+    return [info.rate if len(kinds) > 1 else 1.0 for info in infos]
 
 
 class _Stop(Exception):

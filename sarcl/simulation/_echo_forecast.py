@@ -26,7 +26,7 @@ from ..numerics import cost_model
 from ._echo_work import EchoWork
 from ._planned_echoes import Method, PlannedEchoes
 from ._single_channel import SingleEchoes
-from .echo_output import bytes_of, pulses_at_once
+from .echo_output import bytes_of
 from .echo_task import EchoTask
 from .points.factorized import FactorizedSpreader
 from .scene_echoes import Added, SceneEchoes
@@ -102,13 +102,9 @@ def _timed(task: EchoTask, planned: PlannedEchoes, prepared: SceneEchoes, work: 
     if pairs < len(quiet) * n_pulses:
         timed = _timed_pulses(quiet, pulse_by_pulse, shape, work)
         seconds, pairs = seconds + timed.seconds * n_pulses, pairs + timed.contributions * n_pulses
-    room = prepared.request.budget
-    at_once = min(method.pulses(room), pulses_at_once(shape, task.options.out, room))
-    if timed is not None and -(-n_pulses // at_once) * method.runs > MOST_PLANS * n_pulses:
+    if timed is not None and method.runs > MOST_PLANS * n_pulses:
         return Estimate(timed.error_terms, timed.words, seconds, pairs)
-    track = Added()
-    for start in range(0, n_pulses, at_once):
-        track += method.planned(quiet, start, min(at_once, n_pulses - start))
+    track = method.planned(quiet)
     return Estimate(track.error_terms, track.plan, seconds, pairs)
 
 
