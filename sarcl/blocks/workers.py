@@ -187,5 +187,12 @@ def rates_of(infos: Sequence[DeviceInfo]) -> list[float]:
     return [info.rate if len(kinds) > 1 else 1.0 for info in infos]
 
 
+def speedup(infos: Sequence[DeviceInfo]) -> float:
+    """How many times as fast as the first all devices are together; drivers of the same CPU share its cores."""
+    rates = rates_of(infos)
+    cpu = [rate for info, rate in zip(infos, rates, strict=True) if info.kind == "cpu"]
+    return (sum(rates) - sum(cpu) + max(cpu, default=0.0)) / rates[0] if rates[0] > 0 else 1.0
+
+
 class _Stop(Exception):
     """Raised in a thread where another has failed, or where the caller has stopped the run."""

@@ -135,6 +135,7 @@ class EchoPlan:
             engines = [engine, *(recipe.on(device) for device in task.devices[1:])]
             budgets = [recipe.budget(device) for device in task.devices]
             infos = [device.info for device in task.devices]
+            clock.lap("scene")
             workers = LocalWorkers(job, engines, budgets, [info.name for info in infos], rates_of(infos))
         return BandFiller(workers, job, checkpoint, clock, options.progress)
 
