@@ -72,10 +72,12 @@ def demo(args: argparse.Namespace, job: Job) -> int:
 
 def simulate(args: argparse.Namespace, job: Job) -> int:
     """Echoes of a scenario, and their image where there is a grid or --image asks for one."""
-    from ..opencl.choose_device import open_device
+    from ..opencl.choose_device import open_devices
     from ..scenario.scenario import load
+    from ._methods import echo_pieces
 
     scenario = load(args.scenario)
+    running = echo_pieces(args, scenario)
     stem = Path(args.scenario).stem
     output = args.output or f"{stem}_raw.h5"
     images = args.image or ([f"{stem}.png"] if scenario.has_image else [])
@@ -83,22 +85,25 @@ def simulate(args: argparse.Namespace, job: Job) -> int:
     job.expect_named(images, formats.writing("picture", "image"), [args.scenario, output])
     _check_scale(args)
     grid = scenario.build_grid() if scenario.grid is not None else None
-    options: dict[str, Any] = {"device": open_device(args.device)}
-    if args.tolerance is not None:
-        options["tolerance"] = args.tolerance
+    devices = open_devices(args.device)
+    options: dict[str, Any] = {} if args.tolerance is None else {"tolerance": args.tolerance}
+    on: dict[str, Any] = {"device": devices if scenario.simulates_in_blocks else devices[0]}
     if scenario.orbit is not None:
         job.say(scenario.describe_orbit())
     if args.dry_run:
-        print(scenario.plan(**options))
+        print(scenario.plan(**options, **on))
         if images:
             print(f"image: {scenario.describe_image()}")
         return 0
     _check_room(grid, images)
     if scenario.noise is None:  # pulse after pulse into the file
-        raw = scenario.simulate(**options, out=output, progress=job.progress)
+        raw = scenario.simulate(**options, **on, **running, out=output, progress=job.progress)
         job.check()
+        if raw is None:
+            job.say(f"this piece is finished; its tiles wait in {output}.parts for those of the other pieces")
+            return 0
     else:
-        raw = scenario.simulate(**options, progress=job.progress)
+        raw = scenario.simulate(**options, **on, progress=job.progress)
         job.check()
         raw.save(output)
     _say_report("echo", raw.report, job)
@@ -110,6 +115,7 @@ def simulate(args: argparse.Namespace, job: Job) -> int:
         if grid is None and scenario.needs_grid:
             grid = _default_grid(raw, job, scenario.default_grid_options())
         _check_room(grid, images)
+        options |= {"device": devices if scenario.focuses_in_blocks else devices[0]}
         _focus(lambda out: scenario.focus(raw, grid, out=out, progress=job.progress, **options), images, args, job)
     return 0
 

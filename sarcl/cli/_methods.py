@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from ..model.image import Image
     from ..model.image_grid import ImageGrid
     from ..model.phase_history import PhaseHistory
+    from ..scenario.scenario import Scenario
 
 BLOCKS = ("tile", "resume")
 PLANE = ("grid", "center", "shape", "spacing", "normal", "x_axis")
@@ -103,6 +104,19 @@ def check_default_grid(args: argparse.Namespace, raw: PhaseHistory) -> None:
             f"--{given} places the grid that is chosen for Earth-fixed echoes, and {why}: leave it out, or take "
             "--method range_doppler"
         )
+
+
+def echo_pieces(args: argparse.Namespace, scenario: Scenario) -> dict[str, Any]:
+    """The arguments --tile and --resume of `sarcl simulate`. ValueError where the echoes are not computed in pieces."""
+    running = {name: getattr(args, name) for name in BLOCKS if getattr(args, name) is not None}
+    if running and not scenario.simulates_in_blocks:
+        raise ValueError(f"--{next(iter(running))} is for [echo], whose pulses are computed in pieces; leave it out")
+    if running and scenario.noise is not None:
+        raise ValueError(
+            f"--{next(iter(running))} keeps tiles beside a file of echoes, and [noise] is added to all at once, in "
+            "memory: leave [noise] out, and add it to the finished echoes (sarcl.add_noise)"
+        )
+    return running
 
 
 def check_pieces(args: argparse.Namespace, outputs: list[str]) -> None:

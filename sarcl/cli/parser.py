@@ -117,6 +117,7 @@ def _simulate(p: argparse.ArgumentParser) -> None:
     _add(p, "--image IMAGE", images, action="append", default=[])
     _add(p, "--tolerance", "relative error allowed, instead of the scenario's", float)
     _flag(p, "--dry-run", "print size, time and error of the echoes, and write nothing")
+    _pieces(p, "large jobs", "RAW.h5", "puts the echoes together")
     _picture(p)
 
 
@@ -127,7 +128,7 @@ def _focus(p: argparse.ArgumentParser) -> None:
     _focus_grid(p)
     _focus_method(p)
     _focus_ground(p)
-    _focus_pieces(p)
+    _pieces(p, "large images", "IMAGE.h5", "puts the image together")
     _focus_rows(p)
     _picture(p)
 
@@ -180,12 +181,12 @@ def _focus_ground(p: argparse.ArgumentParser) -> None:
     _add(earth, "--doppler-rate HZ/S|data", "Doppler rate (default: from the geometry)", doppler)
 
 
-def _focus_pieces(p: argparse.ArgumentParser) -> None:
-    """Options of large images."""
+def _pieces(p: argparse.ArgumentParser, title: str, name: str, together: str) -> None:
+    """Options of results that are computed in blocks."""
     large = p.add_argument_group(
-        "large images", "finished tiles of an IMAGE.h5 wait in IMAGE.h5.parts; --device all uses every device"
+        title, f"finished tiles of {name} wait in {name}.parts; --device all uses every device"
     )
-    _add(large, "--tile I/N", "make piece I of N alone; the last to finish puts the image together", piece)
+    _add(large, "--tile I/N", f"make piece I of N alone; the last to finish {together}", piece)
     text = "keep finished tiles whatever ends the run (default: when it is killed), or --no-resume: start again"
     _add(large, "--resume", text, action=argparse.BooleanOptionalAction)
 

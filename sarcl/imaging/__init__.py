@@ -21,10 +21,11 @@ For other folders:
     float64/         direct backprojection in float64
     polar_format/    polar_format(): plane wavefronts and one two-dimensional FFT
     range_doppler/   range_doppler(): FFTs along the track and in range, for near-straight tracks
-    run/             the work in blocks: devices, checkpoints, output files
     tiling/          a grid in tiles, the tiles in bands: one class for each kind of grid
 
 For this folder alone:
 
+    _image_job       an image as a job that is computed in blocks
+    _image_output    destination of pixels: memory, an array of the caller's, or a file
     _row_coverage    which rows saw a pixel, and the sum of their weights: the gain of the image
 """

@@ -14,13 +14,19 @@ from ..base.errors import confirm_tolerance, warn
 from ..base.forecast import Forecast, Plan
 from ..base.report import Report
 from ..base.stage_timer import Clock
-from ..base.validation import count, instance
 from ..base.verb import verb
+from ..blocks.bands import BandBuffer
+from ..blocks.block_job import BlockJob
+from ..blocks.checkpoint import Checkpoint
+from ..blocks.fill_bands import BandFiller
+from ..blocks.workers import LocalWorkers, WorkerPool
 from ..model.image import Image
 from ..model.image_grid import ImageGrid
 from ..model.phase_history import PhaseHistory
 from ..opencl.choose_device import open_devices
 from ..opencl.device import Device
+from ._image_job import ImageRecipe, image_job
+from ._image_output import ImageOutput, is_path
 from ._row_coverage import room_for_gain, seen_by
 from .antenna_beam import shares
 from .backproject_options import BackprojectOptions
@@ -30,11 +36,6 @@ from .focus_options import collection, relative_error
 from .focusing_task import FocusingTask
 from .forecast import forecast_of, speed
 from .pixel_taper import PixelTaper
-from .run.checkpoint import Checkpoint
-from .run.fill_bands import BandFiller
-from .run.image_output import BandBuffer, ImageOutput, is_path
-from .run.tile_files import share
-from .run.workers import LocalWorkers, WorkerPool
 from .unseen_pixels import unseen_pixels
 
 log = logging.getLogger(__name__)
@@ -67,12 +68,12 @@ def backproject(raw: PhaseHistory, grid: ImageGrid, options: BackprojectOptions)
 
 def plan_of(raw: PhaseHistory, grid: ImageGrid, options: BackprojectOptions) -> BackprojectPlan:
     """The plan of `backproject`."""
-    clock, piece = Clock(), _piece(options)
+    clock, piece = Clock(), options.piece(is_path(options.out), "image.h5")
     mapped, task = options.task(raw, grid)
     if options.cluster is None:
         chosen = options.choose(task, open_devices(options.device))
     else:
-        from .run.dask_workers import device_class
+        from ..blocks.dask_workers import device_class
 
         chosen = choose(task, options.method, options.tolerance, device_class(options.cluster, options.device))
     clock.lap("plan")
@@ -112,7 +113,7 @@ class BackprojectPlan:
         """The pixels alone."""
         with ExitStack() as stack:
             output = ImageOutput(self.grid, self.chosen.tiling, None, stack, self.chosen.dtype)
-            self._filler(None, Clock(), progress=False).fill(output, (0, self.chosen.tiling.n_bands))
+            self._filler(None, Clock(), progress=False).fill(output.flat)
             output.finish()
         return np.asarray(output.data)
 
@@ -125,19 +126,18 @@ class BackprojectPlan:
         return image  # type: ignore[return-value]
 
     def _image(self, stack: ExitStack, clock: Clock) -> Image | None:
-        options, n_bands, out = self.options, self.chosen.tiling.n_bands, self.options.out
+        options, out = self.options, self.options.out
         checkpoint = None
         if is_path(out):
             kept = True if self.piece else options.resume
-            checkpoint = Checkpoint(out, self.task, self.chosen, options.tolerance, kept)
+            checkpoint = Checkpoint(out, image_job(self.task, self.chosen, options.tolerance), kept)
             stack.push(checkpoint)
         filler = self._filler(checkpoint, clock)
         if self.piece and checkpoint:
             finished = checkpoint.finished()
-            if finished is not None:
+            if isinstance(finished, Image):
                 return finished
-            filler.fill(None, share(n_bands, *self.piece, self.chosen.unit))
-            if not checkpoint.complete():
+            if not filler.fill_piece(self.piece):
                 return None
         try:
             output = ImageOutput(self.grid, self.chosen.tiling, out, stack, self.chosen.dtype)
@@ -147,7 +147,8 @@ class BackprojectPlan:
             raise
         if checkpoint:
             checkpoint.begin()
-        skipped, n_kept = filler.fill(output, (0, n_bands))
+        skipped, n_kept = filler.fill(output.flat)
+        assert isinstance(skipped, Skipped)
         output.finish()
         fields = self._fields(filler, skipped, n_kept, output)
         image = output.image(job=checkpoint.mark if checkpoint and checkpoint.tiles else None, **fields)
@@ -159,21 +160,23 @@ class BackprojectPlan:
     def _filler(self, checkpoint: Checkpoint | None, clock: Clock, progress: bool = True) -> BandFiller:
         """The filler of this task on its workers."""
         report = self.options.progress if progress else None
-        return BandFiller(self._workers(), self.task, self.chosen, checkpoint, clock, report)
+        job = image_job(self.task, self.chosen, self.options.tolerance)
+        return BandFiller(self._workers(job), job, checkpoint, clock, report)
 
-    def _workers(self) -> WorkerPool:
+    def _workers(self, job: BlockJob) -> WorkerPool:
         """The workers that make the image."""
         options, task, chosen = self.options, self.task, self.chosen
         if options.cluster is not None:
-            from .run.dask_workers import DaskWorkers
+            from ..blocks.dask_workers import DaskWorkers
 
-            return DaskWorkers(options.cluster, task, chosen, options.device, options.max_bytes)
+            recipe = ImageRecipe.portable(task, chosen, options.max_bytes)
+            return DaskWorkers(options.cluster, job, recipe, options.device, np.inf)
         devices = open_devices(options.device)
         engines = [chosen.on(d, task) for d in devices]
         kinds = {(d.info.platform, d.info.name, d.info.kind, d.info.units) for d in devices}
         rates = [speed(d) for d in devices] if len(kinds) > 1 else [1.0 for _ in devices]
         budgets = [options.budget(d) for d in devices]
-        return LocalWorkers(engines, budgets, [d.info.name for d in devices], task.raw.n_rows, rates)
+        return LocalWorkers(job, engines, budgets, [d.info.name for d in devices], rates)
 
     def _fields(self, filler: BandFiller, skipped: Skipped, n_kept: int, output: ImageOutput) -> dict[str, Any]:
         """Fields of the Image about its data: gain, carrier, collection, report; warns of pixels that no row sees.
@@ -229,30 +232,6 @@ class BackprojectPlan:
             if done:
                 log.warning(NOTHING_SEEN, "range window and beam", " and the beam")
         return {"gain": gain}
-
-
-def _piece(options: BackprojectOptions) -> tuple[int, int] | None:
-    """`tile` as (i, n), 0 <= i <= n, or None; ValueError for options that do not go together."""
-    tile, resume = options.tile, options.resume
-    if resume is not None:
-        instance("resume", resume, bool)
-    if (tile is not None or resume) and not is_path(options.out):
-        name, value = ("tile", tile) if tile is not None else ("resume", resume)
-        raise ValueError(
-            f'{name} is {" ".join(repr(value).split()):.60} but out is no path; give out="image.h5": tiles are '
-            "kept beside it"
-        )
-    if tile is None:
-        return None
-    if resume is False:
-        raise ValueError("tile and resume=False do not go together: a piece would delete the tiles of the other pieces")
-    parts: Any = tile
-    if not isinstance(parts, (tuple, list)) or len(parts) != 2:
-        raise ValueError(f"tile is {' '.join(repr(tile).split()):.60}; wanted (i, n): piece i of n")
-    i, n = count("tile[0]", parts[0], least=0), count("tile[1]", parts[1])
-    if i > n:
-        raise ValueError(f"tile is {tile!r}; pieces of {n} are numbered 1 to {n}")
-    return i, n
 
 
 def _antenna_gain(

@@ -4,32 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
-
-import numpy as np
+from typing import Literal
 
 from ..arrays.map_aperture import MapApertureOptions, MapKind, map_aperture
 from ..base.options import option
 from ..base.types import PathLike, WritableArray
 from ..base.validation import choice, flag, instance
+from ..blocks.block_options import BlockOptions
 from ..model.image_grid import ImageGrid
 from ..model.phase_history import PhaseHistory
 from ..numerics import cost_model
 from ..numerics.cost_model import DeviceClass
 from ..opencl import native_functions
-from ..opencl.device import Device, DeviceChoice
+from ..opencl.device import Device
 from .choose_method import METHODS, MethodChoice, choose
 from .focus_options import GridOptions
 from .focusing_task import BeamCone, FocusingTask, Skip, make_task
 
-if TYPE_CHECKING:
-    import distributed
-
-Tile = Sequence[int] | np.ndarray  # (i, n): piece i of n
-
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class BackprojectOptions(GridOptions):
+class BackprojectOptions(GridOptions, BlockOptions):
     """Options of `backproject`."""
 
     method: Literal["auto", "direct", "factorized"] = option(
@@ -65,25 +59,6 @@ class BackprojectOptions(GridOptions):
         None,
         'None, a writable complex array of grid.shape (memmap, HDF5 dataset), or a path ending in ".h5"',
         in_files=False,
-    )
-    resume: bool | None = option(
-        None,
-        'whether finished tiles of an image at a path are kept in "PATH.parts", where the same call finds them if the '
-        "run is killed. None: they are kept from the first second on; True: also when the run ends in an exception; "
-        "False: they are not kept, and those of earlier runs are deleted",
-        in_files=False,
-    )
-    tile: Tile | None = option(
-        None,
-        '(i, n): compute only piece i of n, 1 <= i <= n, and keep its tiles in "PATH.parts"; the run that completes '
-        "the image assembles and returns it, the others return None",
-        in_files=False,
-    )
-    device: DeviceChoice | Sequence[DeviceChoice] | None = option(  # type: ignore[assignment]  # wider than others'
-        None, 'see `sarcl.devices`; a list of devices, or "all", for several at once', in_files=False
-    )
-    cluster: distributed.Client | None = option(
-        None, "a dask.distributed.Client whose workers compute the tiles, each on a device of its own", in_files=False
     )
 
     def task(self, raw: PhaseHistory, grid: ImageGrid) -> tuple[PhaseHistory, FocusingTask]:

@@ -9,13 +9,15 @@ from typing import Protocol
 import numpy as np
 
 from ..base.stage_timer import Clock
+from ..blocks import bands
+from ..blocks.bands import FlatArray, Run
 from ..numerics import cost_model, device_profiles, range_profiles
 from ..numerics.device_profiles import DeviceProfiles
 from ..numerics.interpolation import Interpolator
 from ..opencl.device import Buffer, Device
 from ..opencl.pipeline import Pipeline
 from .focusing_task import FocusingTask
-from .tiling.tiling import FlatImage, Run, Tiling
+from .tiling.tiling import Tiling
 
 
 @dataclass(frozen=True)
@@ -61,26 +63,21 @@ class ImagePlan(Protocol):
         ...
 
 
-class Engine(Protocol):
+class Engine(bands.Engine, Protocol):
     """A method of focusing, on one device, for one task and plan.
 
-    tiling        tiling whose bands are the units of work; fixed by grid, geometry and tolerance
-    dtype         data type of the pixels: complex64 or complex128
-    least_pixels  pixels a block should have at least, so that the cost of the range profiles, which every block makes
-                  anew, stays below a tenth; inf: blocks are as large as memory allows, and a killed run loses as much
+    tiling  tiling whose bands are computed in blocks; fixed by grid, geometry and tolerance
+    dtype   data type of the pixels: complex64 or complex128
+    least   pixels a block should have at least, so that the cost of the range profiles, which every block makes anew,
+            stays below a tenth; inf: blocks are as large as memory allows, and a killed run loses as much
     """
 
     tiling: Tiling
     dtype: type[np.complexfloating]
-    least_pixels: float
+    least: float = np.inf
+    most: float = np.inf
 
     def __init__(self, device: Device, task: FocusingTask, plan: object, tiling: Tiling) -> None: ...
-
-    def blocks(self, nbytes: float) -> list[Run]:
-        """Runs (first, last) of bands that together are all, each to be filled with nbytes on the device.
-
-        MemoryError where nbytes is too little for anything.
-        """
 
     def working(self, nbytes: float) -> float:
         """Estimated bytes on the device that `fill` takes for the first block when it is given nbytes."""
@@ -90,14 +87,9 @@ class Engine(Protocol):
         device divide the image: range profiles, and what precedes the division."""
 
     def fill(
-        self, first: int, last: int, flat: FlatImage, budget: float, clock: Clock, on_progress: Callable[[float], None]
+        self, first: int, last: int, flat: FlatArray, budget: float, clock: Clock, on_progress: Callable[[float], None]
     ) -> Skipped:
-        """Write the pixels of bands first ... last - 1 to their places in `flat` (ImageOutput.flat).
-
-        budget       bytes on the device, all in all
-        on_progress  called as on_progress(rows_done): how many of the task's rows these bands have had so far
-        Returns the number of (row, pixel) pairs that were skipped.
-        """
+        """See bands.Engine; passes are the task's rows. Returns the number of (row, pixel) pairs that were skipped."""
 
 
 class DirectEngine(Engine, Protocol):

@@ -110,7 +110,7 @@ def _with_checksums(dataset: h5py.Dataset, sums: _checksums.Checksums | None) ->
 
 
 def job_of(path: PathLike) -> str | None:
-    """The mark of the job that made an image file; None where there is no such file, or no mark in a whole file."""
+    """The mark of the job that made a file; None where there is no such file, or no mark in a whole file."""
     try:
         _verify_checksums(path)
         with _open_file(path) as file:
@@ -124,6 +124,11 @@ class _Writer:
     """A file in the making, removed when a step of it fails."""
 
     _unfinished: Unfinished
+
+    def mark(self, job: str) -> None:
+        """Note which job made this file, for `job_of`."""
+        with self._unfinished.writing():
+            self._unfinished.file.attrs["job"] = job
 
     def abandon(self) -> None:
         """Remove the unfinished file; `path` is as it was. Nothing happens after `close`."""
@@ -167,11 +172,6 @@ class ImageWriter(_Writer):
                 _put_group(self._unfinished.file, "grid", grid)
             self.data = self._unfinished.dataset("data", shape, dtype)
 
-    def mark(self, job: str) -> None:
-        """Note which job made this file, for `job_of`."""
-        with self._unfinished.writing():
-            self._unfinished.file.attrs["job"] = job
-
     def check_open(self) -> None:
         """ValueError where the file was finished or abandoned already."""
         if not self._unfinished.is_open:
@@ -193,10 +193,13 @@ class ImageWriter(_Writer):
 class EchoWriter(_Writer):
     """A file of echoes in the making: `samples` (n_rows, n_samples), zero until written; then `close` or `abandon`."""
 
-    def __init__(self, path: PathLike, n_rows: int, n_samples: int, dtype: DTypeLike = np.complex64) -> None:
+    def __init__(
+        self, path: PathLike, n_rows: int, n_samples: int, dtype: DTypeLike = np.complex64, resumes: bool = False
+    ) -> None:
+        """resumes  as of ImageWriter"""
         nbytes = n_rows * n_samples * np.dtype(dtype).itemsize
         self.path, self._row_bytes = Path(path), n_rows * ROW_BYTES
-        self._unfinished = Unfinished(path, "phase_history", nbytes + self._row_bytes)
+        self._unfinished = Unfinished(path, "phase_history", nbytes + self._row_bytes, resumes)
         with self._abandoned_on_error():
             self.samples = self._unfinished.dataset("samples", (n_rows, n_samples), dtype)
             self._unfinished.reserve(nbytes + self._row_bytes)

@@ -7,7 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from .. import verbs
+from ..blocks.block_options import BlockOptions
 from ._schema import Where
+
+
+def in_blocks(section: str) -> bool:
+    """Whether the verb of a section computes its result in blocks: on several devices, in pieces."""
+    return issubclass(getattr(verbs, section).options, BlockOptions)
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from . import _focusing, _schema, _simulating
 from ._building import Builder
 from ._earth import pass_text
 from ._schema import Where
+from ._verb_call import in_blocks
 
 if TYPE_CHECKING:
     from ..base.types import PathLike
@@ -177,8 +178,8 @@ class Scenario:
         return self._noisy(_simulating.call_of(self, options).run(), level)
 
     def _noisy(self, raw: PhaseHistory, level: dict[str, Any]) -> PhaseHistory:
-        """Echoes with the noise of [noise], of that level."""
-        if self.noise is None:
+        """Echoes with the noise of [noise], of that level; None stays None: a piece while others are missing."""
+        if self.noise is None or raw is None:
             return raw
         from ..effects.noise import add_noise
 
@@ -204,6 +205,16 @@ class Scenario:
         level = self._noise_level()
         forecast: Forecast[PhaseHistory] = _simulating.call_of(self, options).plan()
         return replace(forecast, run=lambda: self._noisy(forecast.run(), level))
+
+    @property
+    def simulates_in_blocks(self) -> bool:
+        """Whether `simulate` takes several devices, and pieces."""
+        return in_blocks(_simulating.section_of(self))
+
+    @property
+    def focuses_in_blocks(self) -> bool:
+        """Whether `focus` takes several devices, and pieces."""
+        return in_blocks(_focusing.section_of(self))
 
     @property
     def has_image(self) -> bool:

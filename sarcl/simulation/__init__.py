@@ -22,6 +22,7 @@ For other folders:
 
 For this folder alone:
 
+    _echo_blocks       echoes as a job that is computed in blocks of pulses
     _echo_forecast     rows, bytes, seconds and errors of a plan of echoes, before the work
     _echo_plan         the plan of echoes, and its run
     _echo_work         how much work echoes are, by the numbers of pieces and pulses

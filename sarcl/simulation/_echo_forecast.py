@@ -21,12 +21,13 @@ from ..base.forecast import Forecast
 from ..base.report import SMALLER_TOLERANCE, ErrorTerm, root_sum_square
 from ..base.stage_timer import Clock
 from ..base.text import duration
+from ..blocks.workers import speedup
 from ..model.phase_history import PhaseHistory
 from ..numerics import cost_model
 from ._echo_work import EchoWork
 from ._planned_echoes import Method, PlannedEchoes
 from ._single_channel import SingleEchoes
-from .echo_output import bytes_of, pulses_at_once
+from .echo_output import bytes_of
 from .echo_task import EchoTask
 from .points.factorized import FactorizedSpreader
 from .scene_echoes import Added, SceneEchoes
@@ -55,6 +56,8 @@ def forecast_of(
 ) -> Forecast[PhaseHistory]:
     """The Forecast of planned echoes.
 
+    The scene is prepared by every device, at the same time or by one after the other; pulses are shared.
+
     clock   of planning;  run_of  gives the function that carries out a plan
     plan["contributions"]  about the number of pairs of scatterer, pulse and channel that will be added up
     plan["spectral_echo"]  about the seconds of `spectral_echo` instead, or why it refuses or was not planned
@@ -72,7 +75,7 @@ def forecast_of(
         clock.lap("plan")
         estimate = Estimate(_allotted(planned), known, work.seconds, work.contributions)
     spent = sum(clock.seconds.values())
-    seconds = spent + estimate.seconds
+    seconds = spent + estimate.seconds / _workers(task)
     words = planned.channels.words(planned.method, estimate.words)  # type: ignore[arg-type]
     words |= {"contributions": estimate.contributions, "spectral_echo": _spectral(task, work, seconds)}
     return Forecast(
@@ -89,6 +92,13 @@ def forecast_of(
     )
 
 
+def _workers(task: EchoTask) -> float:
+    """How many times as fast as the first device all are that share the pulses; workers of a cluster count as one."""
+    if task.options.cluster is not None:
+        return float(max(1, len(task.options.cluster.nthreads())))
+    return speedup([device.info for device in task.devices])
+
+
 def _timed(task: EchoTask, planned: PlannedEchoes, prepared: SceneEchoes, work: EchoWork) -> Estimate:
     """The errors of all pulses, and from a few of them the seconds and contributions of all."""
     shape, method = planned.channels.shape, planned.method
@@ -102,13 +112,9 @@ def _timed(task: EchoTask, planned: PlannedEchoes, prepared: SceneEchoes, work: 
     if pairs < len(quiet) * n_pulses:
         timed = _timed_pulses(quiet, pulse_by_pulse, shape, work)
         seconds, pairs = seconds + timed.seconds * n_pulses, pairs + timed.contributions * n_pulses
-    room = prepared.request.budget
-    at_once = min(method.pulses(room), pulses_at_once(shape, task.options.out, room))
-    if timed is not None and -(-n_pulses // at_once) * method.runs > MOST_PLANS * n_pulses:
+    if timed is not None and method.runs > MOST_PLANS * n_pulses:
         return Estimate(timed.error_terms, timed.words, seconds, pairs)
-    track = Added()
-    for start in range(0, n_pulses, at_once):
-        track += method.planned(quiet, start, min(at_once, n_pulses - start))
+    track = method.planned(quiet)
     return Estimate(track.error_terms, track.plan, seconds, pairs)
 
 
@@ -149,7 +155,8 @@ def _allotted(planned: PlannedEchoes) -> tuple[ErrorTerm, ...]:
 def _spectral(task: EchoTask, work: EchoWork, seconds: float) -> str:
     """About the seconds of spectral_echo with these arguments, or why it refuses them or was not planned."""
     try:
-        spectral = spectral_task(task.original, task.waveform, task.given_track, task.options)
+        on_one = replace(task.options, device=task.devices[0])
+        spectral = spectral_task(task.original, task.waveform, task.given_track, on_one)
         longest = SPECTRAL_SHARE * work.seconds
         if work.cutting > longest:
             return "not planned: its facets would have to be cut and illuminated first"

@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
+from typing import Any
 
 from ..arrays.channels import is_single
 from ..base.errors import confirm_tolerance, warned_once
 from ..base.forecast import Forecast
 from ..base.report import Report
 from ..base.stage_timer import Clock
+from ..blocks.checkpoint import Checkpoint
+from ..blocks.fill_bands import BandFiller
+from ..blocks.workers import LocalWorkers, WorkerPool, rates_of
 from ..model.phase_history import PhaseHistory
+from ._echo_blocks import EchoEngine, EchoRecipe, echo_job
 from ._echo_forecast import forecast_of
-from ._planned_echoes import Channels, Method, PlannedEchoes
+from ._planned_echoes import Channels, PlannedEchoes
 from ._single_channel import SingleChannel
 from .channels.array_channels import ArrayChannels
 from .echo_check import worth_checking
@@ -27,12 +33,14 @@ class EchoPlan:
     """Echoes to be computed: a Plan.
 
     channels  rows and samples;  seconds  of planning, by stage
+    piece     (i, n) where only that piece of the pulses is computed
     planned   None until `forecast` or `run` plans the scene: its samples have a place before that
     """
 
     task: EchoTask
     channels: Channels
     seconds: dict[str, float]
+    piece: tuple[int, int] | None = None
     planned: PlannedEchoes | None = None
 
     @classmethod
@@ -40,8 +48,9 @@ class EchoPlan:
         """The plan of a task."""
         array = task.options.array
         channels = SingleChannel(task) if array is None or is_single(array) else ArrayChannels(task, array)
+        piece = task.options.piece(task.options.out is not None, "raw.h5")
         clock.lap("plan")
-        return cls(task, channels, clock.seconds)
+        return cls(task, channels, clock.seconds, piece)
 
     def request(self, clock: Clock) -> EchoRequest:
         """What is asked for, with a clock."""
@@ -65,47 +74,101 @@ class EchoPlan:
             return forecast_of(self.task, planned, clock, run_of)
 
     def run(self) -> PhaseHistory:
-        """The echoes."""
-        clock, channels, options = Clock(self.seconds), self.channels, self.task.options
-        request = self.request(clock)
-        with EchoOutput(channels.shape, options.out, request.budget, channels.window) as output:
-            request.report("scene", 0, 3)
-            with warned_once():  # the scene may be prepared for one method and then for the other
-                planned, prepared = self.plan_scene(request).with_scene()
-            added = _filled(planned.method, prepared, output)
-            prepared.check_seen(added.counts, *channels.window)
-            clock.lap("spectra")
-            measured = None
-            if worth_checking(prepared, options.check, channels.overlap):
-                measured = channels.measured(prepared, output)
-                clock.lap("check")
-            raw = output.finish(
-                **channels.fields(),
-                waveform=self.task.waveform,
-                array=options.array,
-                compressed=options.compressed,
-                report=Report(
-                    plan=channels.words(planned.method, added.plan),  # type: ignore[arg-type]
-                    tolerance=options.tolerance,
-                    predicted_error=added.predicted_error,
-                    error_terms=added.error_terms,
-                    measured_error=measured,
-                    **channels.counted(planned.method, prepared, added.counts),  # type: ignore[arg-type]
-                    seconds=clock.seconds,
-                    device=request.device.info.name,
-                    seed=request.seed,
-                ),
-            )
-        confirm_tolerance(raw=raw)
+        """The echoes; None for a piece while others are missing."""
+        with ExitStack() as stack:
+            raw = self._echoes(stack, Clock(self.seconds))
+        if raw is not None:
+            confirm_tolerance(raw=raw)
+        return raw  # type: ignore[return-value]
+
+    def _echoes(self, stack: ExitStack, clock: Clock) -> PhaseHistory | None:
+        options, request, checkpoint = self.task.options, self.request(clock), None
+        output = None if self.piece else stack.enter_context(self._output())  # room is found before the work
+        if options.out is not None:
+            kept = True if self.piece else options.resume
+            checkpoint = Checkpoint(options.out, echo_job(self.task, self.channels.shape), kept)
+            stack.push(checkpoint)
+        finished = checkpoint.finished() if self.piece and checkpoint else None
+        if isinstance(finished, PhaseHistory):
+            return finished
+        request.report("scene", 0, 3)
+        with warned_once():  # the scene may be prepared for one method and then for the other
+            planned, prepared = self.plan_scene(request).with_scene()
+            filler = self._filler(planned, prepared, checkpoint, clock)
+        if self.piece and not filler.fill_piece(self.piece):
+            return None
+        if output is None:
+            try:
+                output = stack.enter_context(self._output())
+            except FileExistsError:  # another run is assembling the echoes from all tiles
+                return None
+        if checkpoint:
+            checkpoint.begin()
+        added, n_kept = filler.fill(output.flat)
+        assert isinstance(added, Added)
+        prepared.check_seen(added.counts, *self.channels.window)
+        clock.lap("spectra")
+        fields = self._fields(planned, prepared, filler, output, added=added, n_kept=n_kept)
+        raw = output.finish(checkpoint.mark if checkpoint else None, **fields)
+        if checkpoint:
+            checkpoint.done()
         return raw
 
+    def _output(self) -> EchoOutput:
+        """Destination of the samples."""
+        channels, options = self.channels, self.task.options
+        return EchoOutput(channels.shape, options.out, self.task.request.budget, channels.window, resumes=True)
 
-def _filled(method: Method, prepared: SceneEchoes, output: EchoOutput) -> Added:
-    """Fill the output with samples."""
-    added, total = Added(), len(prepared) * method.runs
-    pulses = min(method.pulses(prepared.request.budget), output.pulses)
-    for start in range(0, len(output), pulses):
-        block = output.block(start, min(start + pulses, len(output)))
-        added += method.fill(prepared, block, start, added.counts.pairs, total)
-        output.keep(start, block)
-    return added
+    def _filler(
+        self, planned: PlannedEchoes, prepared: SceneEchoes, checkpoint: Checkpoint | None, clock: Clock
+    ) -> BandFiller:
+        """What fills the samples, by the devices of the task; the others prepare the scene too."""
+        task, options = self.task, self.task.options
+        engine, recipe = EchoEngine(planned, prepared), EchoRecipe(planned.unprepared(), options.max_bytes)
+        job = echo_job(task, self.channels.shape, engine.passes)
+        workers: WorkerPool
+        if options.cluster is not None:
+            from ..blocks.dask_workers import DaskWorkers
+
+            workers = DaskWorkers(options.cluster, job, recipe, options.device, engine.most)
+        else:
+            engines = [engine, *(recipe.on(device) for device in task.devices[1:])]
+            budgets = [recipe.budget(device) for device in task.devices]
+            infos = [device.info for device in task.devices]
+            clock.lap("scene")
+            workers = LocalWorkers(job, engines, budgets, [info.name for info in infos], rates_of(infos))
+        return BandFiller(workers, job, checkpoint, clock, options.progress)
+
+    def _fields(
+        self,
+        planned: PlannedEchoes,
+        prepared: SceneEchoes,
+        filler: BandFiller,
+        output: EchoOutput,
+        *,
+        added: Added,
+        n_kept: int,
+    ) -> dict[str, Any]:
+        """Fields of the PhaseHistory; n_kept  pulses that files of earlier runs held."""
+        channels, options, clock = self.channels, self.task.options, filler.clock
+        measured = None
+        if worth_checking(prepared, options.check, channels.overlap):
+            measured = channels.measured(prepared, output)
+            clock.lap("check")
+        plan = channels.words(planned.method, added.plan)  # type: ignore[arg-type]
+        if n_kept:
+            plan["from files"] = f"{n_kept} of {len(output)} pulses"
+        report = Report(
+            plan=plan,
+            tolerance=options.tolerance,
+            predicted_error=added.predicted_error,
+            error_terms=added.error_terms,
+            measured_error=measured,
+            **channels.counted(planned.method, prepared, added.counts),  # type: ignore[arg-type]
+            seconds=clock.seconds,
+            device=" + ".join(filler.workers.names),
+            seed=prepared.request.seed,
+        )
+        compressed, waveform = options.compressed, self.task.waveform
+        own = {"waveform": waveform, "array": options.array, "compressed": compressed, "report": report}
+        return {**channels.fields(), **own}

@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ..base.errors import ToleranceUnreachable
+from ..base.stage_timer import Clock
+from ..opencl.device import Device
 from ._single_channel import SingleChannel, SingleEchoes
 from .channels.array_channels import ArrayChannels
 from .channels.array_channels import Method as ArrayMethod
@@ -55,6 +57,16 @@ class PlannedEchoes:
                 raise
             return self.first_of(self.channels, self.others).with_scene()
         return replace(self, prepared=prepared), prepared
+
+    def unprepared(self) -> PlannedEchoes:
+        """The same without the prepared scene and the methods that were not needed."""
+        return replace(self, method=self.method.fresh(), others=(), prepared=None)
+
+    def on(self, device: Device, budget: float) -> PlannedEchoes:
+        """The same for another device, with so many bytes for blocks there: its scene is to be prepared."""
+        request = replace(self.scene.request, device=device, budget=budget, progress=None, clock=Clock())
+        scene = replace(self.scene, request=request)
+        return replace(self, method=self.method.fresh(), scene=scene, prepared=None)
 
     def asked_by(self, request: EchoRequest) -> PlannedEchoes:
         """The same with the clock and the progress function of another request."""

@@ -18,7 +18,7 @@ from .echo_task import EchoTask
 from .points.factorized import FactorizedSpreader
 from .scene_echoes import Added, ChannelEchoes, SceneEchoes
 from .scene_plan import SeenScene
-from .spreading import Band, Counts
+from .spreading import Band, Counts, most_pulses
 
 
 class SingleChannel:
@@ -95,6 +95,14 @@ class SingleEchoes:
         """Pulses per call of `fill`: all of them."""
         return self.runs
 
+    def least(self, scene: SceneEchoes) -> float:
+        """Pulses of a block, at least: by levels all blocks repeat the work on small cells."""
+        return np.inf if self.channel(scene).apart()[1] else most_pulses(scene.request.device)
+
+    def fresh(self) -> SingleEchoes:
+        """The same for another device: nothing is planned yet."""
+        return SingleEchoes(self.rows)
+
     def channel(self, scene: SceneEchoes) -> ChannelEchoes:
         """The plan of the echoes of a scene."""
         rows = self.rows
@@ -119,8 +127,8 @@ class SingleEchoes:
         samples *= self.rows.spectrum(scene).astype(np.complex64)
         return Added(channel.error_terms, channel.plan, counts)
 
-    def planned(self, scene: SceneEchoes, start: int, n: int) -> Added:
-        """The plan of the echoes of n pulses from `start` on, without these."""
+    def planned(self, scene: SceneEchoes) -> Added:
+        """The plan of the echoes of all pulses, without these."""
         channel = self.channel(scene)
         return Added(channel.error_terms, channel.plan)
 

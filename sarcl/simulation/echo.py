@@ -28,9 +28,10 @@ def echo(scene: Scene, waveform: Waveform, track: Trajectory, options: EchoOptio
     is where it is when the echo of the reference point arrives, on the rotating Earth. report.plan says which, and how
     much stop and go leaves out (docs/theory/orbits.md).
 
-    Returns a PhaseHistory. ToleranceUnreachable, a ValueError: a tolerance that cannot be met, with the best that can,
-    before the work starts. ToleranceMissed, a ValueError that holds the finished echoes: the check measured more than
-    the tolerance. ValueError, MemoryError, sarcl.NoDeviceError say what else does not fit.
+    Returns a PhaseHistory; with `tile`, None until the piece that completes it. ToleranceUnreachable, a ValueError: a
+    tolerance that cannot be met, with the best that can, before the work starts. ToleranceMissed, a ValueError that
+    holds the finished echoes: the check measured more than the tolerance. ValueError: tiles of other echoes in
+    "PATH.parts". ValueError, MemoryError, sarcl.NoDeviceError say what else does not fit.
     Source: the echo equation of sarcl/__init__.py.
     """
     clock = Clock()

@@ -8,6 +8,7 @@ from typing import Literal
 
 from ..base.options import option
 from ..base.validation import choice
+from ..blocks.block_options import BlockOptions
 from ..numerics import plan
 from .scene_options import SceneOptions
 
@@ -21,7 +22,7 @@ SKIPS = ("zero reflectivity", "facing away", "range window", "out of beam", "equ
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class EchoOptions(SceneOptions):
+class EchoOptions(SceneOptions, BlockOptions):
     """Options of `echo`."""
 
     method: Literal["auto", "direct", "factorized"] = option(

@@ -12,6 +12,7 @@ from ..base import host_memory
 from ..base.text import size_text
 from ..base.types import PathLike
 from ..base.validation import sealed
+from ..blocks.bands import FlatArray
 from ..io import formats
 from ..io.sarcl_hdf5 import ROW_BYTES
 from ..model import store
@@ -41,12 +42,18 @@ def pulses_at_once(shape: tuple[int, ...], out: object, budget: float) -> int:
 class EchoOutput:
     """Samples (n_pulses, ..., n_samples), complex64; a row is the last axis.
 
-    out  the file they are written to, or None: memory. Its size is logged before the computation starts.
+    out      the file they are written to, or None: memory. Its size is logged before the computation starts.
+    resumes  the run goes on from its tiles, for the message of a full disk
     MemoryError gives the bytes that they would take; for a file, the errors of `output_paths.check_writable`.
     """
 
     def __init__(
-        self, shape: tuple[int, ...], out: PathLike | None, budget: float, window: tuple[float, float]
+        self,
+        shape: tuple[int, ...],
+        out: PathLike | None,
+        budget: float,
+        window: tuple[float, float],
+        resumes: bool = False,
     ) -> None:
         check_name(out)
         self.shape, self.writer, self.whole = shape, None, np.zeros(0, np.complex64)
@@ -64,7 +71,8 @@ class EchoOutput:
                 "carriers differ in their frequencies"
             )
         if out is not None:
-            self.writer = formats.writer_functions(out, "phase history").EchoWriter(out, n_rows, shape[-1])
+            functions = formats.writer_functions(out, "phase history")
+            self.writer = functions.EchoWriter(out, n_rows, shape[-1], resumes=resumes)
             return
         try:
             self.whole = np.zeros(shape, np.complex64)
@@ -73,6 +81,11 @@ class EchoOutput:
                 f"echoes of {shape[0]} pulses, {text}, do not fit in memory; write them to a file "
                 f"(out=...), narrow range_window (now {window[0]:g} to {window[1]:g} m), or split the track"
             ) from None
+
+    @property
+    def flat(self) -> FlatArray:
+        """The samples (n_rows, n_samples)."""
+        return self.whole.reshape(-1, self.shape[-1]) if self.writer is None else self.writer.samples
 
     def block(self, start: int, stop: int) -> np.ndarray:
         """Zeros for the samples of some pulses, to be filled and given to `keep`."""
@@ -113,9 +126,11 @@ class EchoOutput:
         rows = self.writer.samples[pulse * self.a_pulse : (pulse + 1) * self.a_pulse]
         return np.asarray(rows).reshape(self.shape[1:])
 
-    def finish(self, **fields: Any) -> PhaseHistory:
-        """The PhaseHistory of these samples and the other fields."""
+    def finish(self, job: str | None = None, **fields: Any) -> PhaseHistory:
+        """The PhaseHistory of these samples and the other fields; a file gets the fingerprint of its job."""
         if self.writer is not None:
+            if job is not None:
+                self.writer.mark(job)
             return store.finish_phase_history(self.writer, **fields)
         return PhaseHistory(sealed(self.whole.reshape(-1, self.shape[-1])), **fields)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -57,9 +58,9 @@ class EchoRequest:
     method: str = "direct"
 
     @classmethod
-    def of(cls, options: SceneOptions, scene: Scene) -> EchoRequest:
-        """The request of a verb's options for a scene; opens the device."""
-        device, most = open_device(options.device), options.max_bytes
+    def of(cls, options: SceneOptions, scene: Scene, device: Device | None = None) -> EchoRequest:
+        """The request of a verb's options for a scene; opens the device where none is given."""
+        device, most = open_device(options.device) if device is None else device, options.max_bytes
         return cls(
             device=device,
             tolerance=options.tolerance,
@@ -73,6 +74,10 @@ class EchoRequest:
             seed=options.seed,
             progress=options.progress,
         )
+
+    def __getstate__(self) -> dict[str, Any]:
+        """In another process the device is another one, and nobody asks for progress."""
+        return {**self.__dict__, "device": None, "progress": None}
 
     @property
     def same(self) -> list[int]:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from ..base.validation import instance
 from ..model.trajectory import Trajectory
 from ..model.waveform import Waveform
+from ..opencl.choose_device import open_device, open_devices, split_choice
+from ..opencl.device import Device
 from ..scattering import antenna_weights
 from ..scattering.antenna_weights import AntennaWeights
 from ..scene.scene import Scene
@@ -25,6 +28,7 @@ class EchoTask:
     given_track      the transmitter's as it was given
     track, receiver  of the antennas while pulses are on their way;  motion  what the report says of that
     point            the reference point, m (3,);  weights  of antennas and distances
+    devices          that compute them in this process: the first prepares the scene for the report
     """
 
     options: EchoOptions
@@ -38,12 +42,19 @@ class EchoTask:
     point: np.ndarray
     motion: dict[str, object]
     weights: AntennaWeights
+    devices: tuple[Device, ...]
+
+    def __getstate__(self) -> dict[str, Any]:
+        """For another process: without what belongs to this one."""
+        options = replace(self.options, device=None, cluster=None, progress=None)
+        return {**self.__dict__, "options": options, "devices": ()}
 
 
 def echo_task(scene: Scene, waveform: Waveform, track: Trajectory, options: EchoOptions) -> EchoTask:
     """The task of these arguments; opens the device."""
     check_subjects(scene, waveform, track)
-    request = replace(EchoRequest.of(options, scene), method=options.method)
+    devices = _devices(options)
+    request = replace(EchoRequest.of(options, scene, devices[0]), method=options.method)
     point = scene.center if options.reference is None else np.asarray(options.reference)
     sends, hears, motion = echo_sampling.in_flight(track, options.receiver, scene, point)
     echo_sampling.receiver_positions(sends, hears)
@@ -61,7 +72,15 @@ def echo_task(scene: Scene, waveform: Waveform, track: Trajectory, options: Echo
         point=point,
         motion=motion,
         weights=weights,
+        devices=devices,
     )
+
+
+def _devices(options: EchoOptions) -> tuple[Device, ...]:
+    """Devices of this process; with a cluster one, which plans and checks."""
+    if options.cluster is None:
+        return tuple(open_devices(options.device))
+    return (open_device(split_choice(options.device)[0]),)
 
 
 def check_subjects(scene: object, waveform: object, track: object) -> None:

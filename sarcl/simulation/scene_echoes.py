@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -215,6 +215,11 @@ class ChannelEchoes:
         """Relative error of the channel."""
         return root_sum_square(self.error_terms)
 
+    def of(self, scene: SceneEchoes) -> ChannelEchoes:
+        """The same for another request for the scene, without what is kept on the device from call to call."""
+        points = tuple(replace(one) if isinstance(one, FactorizedSpreader) else one for one in self.points)
+        return replace(self, scene=scene, points=points)
+
     def apart(self) -> tuple[ChannelEchoes, list[FactorizedSpreader]]:
         """The echoes that are added pulse by pulse, and what adds the others, by levels for the whole track."""
         by_levels = [spreader for spreader in self.points if isinstance(spreader, FactorizedSpreader)]
@@ -244,11 +249,20 @@ class ChannelEchoes:
 
 @dataclass(frozen=True)
 class Added:
-    """Echoes that were added to samples: terms of the largest predicted error, the plan of the last channel, counts."""
+    """Echoes that were added to samples: terms of the largest predicted error, the plan of the last channel, counts.
+
+    It is the tally of a block (blocks.bands.Tally): mappings become objects again.
+    """
 
     error_terms: tuple[ErrorTerm, ...] = ()
     plan: dict[str, Any] = field(default_factory=dict)
     counts: Counts = field(default_factory=Counts)
+
+    def __post_init__(self) -> None:
+        terms = tuple(ErrorTerm(**term) if isinstance(term, Mapping) else term for term in self.error_terms)
+        object.__setattr__(self, "error_terms", terms)
+        if isinstance(self.counts, Mapping):
+            object.__setattr__(self, "counts", Counts(**self.counts))
 
     @property
     def predicted_error(self) -> float:

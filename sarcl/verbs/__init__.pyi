@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike
 from ..arrays.map_aperture import MapApertureOptions, MapKind
 from ..base.forecast import Forecast
 from ..base.types import PathLike, WritableArray
+from ..blocks.block_options import Tile
 from ..earth.elevation import ElevationModel
-from ..imaging.backproject_options import Tile
 from ..imaging.focusing_task import BeamCone
 from ..imaging.focusing_task import Skip as BackprojectSkip
 from ..model.antenna import Antenna
@@ -55,8 +55,11 @@ class EchoKeywords(TypedDict, total=False):
     reference: ArrayLike | None
     compressed: bool
     out: PathLike | None
-    tolerance: float
+    resume: bool | None
+    tile: Tile | None
     device: DeviceChoice | None
+    cluster: distributed.Client | None
+    tolerance: float
     progress: Progress | None
 
 class SpectralEchoKeywords(TypedDict, total=False):
@@ -112,13 +115,13 @@ class BackprojectKeywords(TypedDict, total=False):
     wrap: bool
     skip: bool | Collection[BackprojectSkip]
     out: PathLike | WritableArray | None
-    resume: bool | None
-    tile: Tile | None
-    device: DeviceChoice | Sequence[DeviceChoice] | None
-    cluster: distributed.Client | None
     sum_polarizations: bool
     window: Window | None
     weights: ArrayLike | None
+    resume: bool | None
+    tile: Tile | None
+    device: DeviceChoice | None
+    cluster: distributed.Client | None
     tolerance: float
     max_bytes: float | None
     check: bool | None
@@ -158,6 +161,7 @@ class RangeDopplerKeywords(TypedDict, total=False):
     device: DeviceChoice | None
     progress: Progress | None
 
+@overload
 def echo(
     scene: Scene,
     waveform: Waveform,
@@ -182,10 +186,48 @@ def echo(
     reference: ArrayLike | None = None,
     compressed: bool = True,
     out: PathLike | None = None,
-    tolerance: float = 0.001,
+    resume: bool | None = None,
+    tile: None = None,
     device: DeviceChoice | None = None,
+    cluster: distributed.Client | None = None,
+    tolerance: float = 0.001,
     progress: Progress | None = None,
 ) -> PhaseHistory:
+    """Echoes s_p(f) = sum_k a_k(p) W(f) exp(-j 2 pi f (tau_k(p) - tau_ref(p))) of every pulse, compressed. Options:
+    docs/guide/options.md."""
+
+@overload
+def echo(
+    scene: Scene,
+    waveform: Waveform,
+    track: Trajectory,
+    *,
+    method: Literal["auto", "direct", "factorized"] = "auto",
+    channels: Literal["simultaneous", "separated"] = "simultaneous",
+    receive: Literal["reference", "own", "all"] = "reference",
+    skip: bool | Collection[EchoSkip] = True,
+    array: AntennaArray | None = None,
+    antenna: Antenna | tuple[Antenna, Antenna] | None = None,
+    radar: Radar | None = None,
+    shadows: bool = True,
+    seed: int = 0,
+    max_edge: float | Literal["auto"] | None = "auto",
+    max_bytes: float | None = None,
+    check: bool | None = None,
+    receiver: Trajectory | None = None,
+    polarization: Polarization | Literal["all"] | Sequence[Polarization] = "HH",
+    vertical: ArrayLike | None = None,
+    range_window: ArrayLike | None = None,
+    reference: ArrayLike | None = None,
+    compressed: bool = True,
+    out: PathLike | None = None,
+    resume: bool | None = None,
+    tile: Tile | None,
+    device: DeviceChoice | None = None,
+    cluster: distributed.Client | None = None,
+    tolerance: float = 0.001,
+    progress: Progress | None = None,
+) -> PhaseHistory | None:
     """Echoes s_p(f) = sum_k a_k(p) W(f) exp(-j 2 pi f (tau_k(p) - tau_ref(p))) of every pulse, compressed. Options:
     docs/guide/options.md."""
 
@@ -254,13 +296,13 @@ def backproject(
     wrap: bool = False,
     skip: bool | Collection[BackprojectSkip] = True,
     out: PathLike | WritableArray | None = None,
-    resume: bool | None = None,
-    tile: None = None,
-    device: DeviceChoice | Sequence[DeviceChoice] | None = None,
-    cluster: distributed.Client | None = None,
     sum_polarizations: bool = False,
     window: Window | None = None,
     weights: ArrayLike | None = None,
+    resume: bool | None = None,
+    tile: None = None,
+    device: DeviceChoice | None = None,
+    cluster: distributed.Client | None = None,
     tolerance: float = 0.001,
     max_bytes: float | None = None,
     check: bool | None = None,
@@ -280,13 +322,13 @@ def backproject(
     wrap: bool = False,
     skip: bool | Collection[BackprojectSkip] = True,
     out: PathLike | WritableArray | None = None,
-    resume: bool | None = None,
-    tile: Tile | None,
-    device: DeviceChoice | Sequence[DeviceChoice] | None = None,
-    cluster: distributed.Client | None = None,
     sum_polarizations: bool = False,
     window: Window | None = None,
     weights: ArrayLike | None = None,
+    resume: bool | None = None,
+    tile: Tile | None,
+    device: DeviceChoice | None = None,
+    cluster: distributed.Client | None = None,
     tolerance: float = 0.001,
     max_bytes: float | None = None,
     check: bool | None = None,
@@ -351,13 +393,13 @@ def plan(
     wrap: bool = False,
     skip: bool | Collection[BackprojectSkip] = True,
     out: PathLike | WritableArray | None = None,
-    resume: bool | None = None,
-    tile: Tile | None = None,
-    device: DeviceChoice | Sequence[DeviceChoice] | None = None,
-    cluster: distributed.Client | None = None,
     sum_polarizations: bool = False,
     window: Window | None = None,
     weights: ArrayLike | None = None,
+    resume: bool | None = None,
+    tile: Tile | None = None,
+    device: DeviceChoice | None = None,
+    cluster: distributed.Client | None = None,
     tolerance: float = 0.001,
     max_bytes: float | None = None,
     check: bool | None = None,

@@ -363,9 +363,9 @@ MAY_CATCH = {
     "io/sarcl_hdf5.py": "h5py's reader of damaged files",
     "fullwave/bodies/materials.py": "the number of the part is put before a message, which is raised again",
     "cli/_job.py": "signals outside the main thread",
-    "imaging/run/tile_files.py": "text that is no JSON",
+    "blocks/tile_files.py": "text that is no JSON",
     "scenario/_schema.py": "the file and line are put before a message, which is raised again",
-    "imaging/run/image_output.py": "numpy's sizes that overflow",
+    "imaging/_image_output.py": "numpy's sizes that overflow",
     "numerics/windows.py": "text of a command line",
 }
 

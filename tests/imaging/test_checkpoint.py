@@ -23,13 +23,15 @@ import pytest
 from helpers.cases import noise_history
 
 import sarcl
+from sarcl.blocks import checkpoint, tile_files
+from sarcl.blocks.bands import BandBuffer
+from sarcl.blocks.tile_files import mark
 from sarcl.cli import parser
+from sarcl.imaging._image_job import image_job
+from sarcl.imaging._image_output import ImageOutput
 from sarcl.imaging.choose_method import choose
 from sarcl.imaging.engine import Skipped
 from sarcl.imaging.focusing_task import make_task
-from sarcl.imaging.run import checkpoint, tile_files
-from sarcl.imaging.run.image_output import BandBuffer, ImageOutput
-from sarcl.imaging.run.tile_files import job_of, mark
 from sarcl.io import output_paths
 
 GRID = sarcl.ImageGrid.plane(center=(1, 2, 0), shape=(700, 301), spacing=(0.03, 0.02))
@@ -194,17 +196,17 @@ def bands(raw):
 def found(raw, path):
     """Runs of bands in the files beside an image, read and checked."""
     task, chosen = make_task(raw, GRID, None, None, False, True), planned(raw)
-    described = job_of(task, chosen.method, 1e-3, chosen.plan, chosen.tiling, chosen.dtype)
-    files = tile_files.TileStore(tile_files.folder_of(path), described, chosen.tiling, chosen.dtype)
+    files = tile_files.TileStore(tile_files.folder_of(path), image_job(task, chosen, 1e-3))
     return [run for run, _, _ in files.found(0, chosen.tiling.n_bands)]
 
 
 def test_tile_files_name_why_pairs_were_skipped(raw, tmp_path):
     tiling, skipped = planned(raw).tiling, Skipped(window=2**70, beam=3)
-    files = tile_files.TileStore(tmp_path / "image.h5.parts", {}, tiling, np.complex64)
+    job = image_job(make_task(raw, GRID, None, None, False, True), planned(raw), 1e-3)
+    files = tile_files.TileStore(tmp_path / "image.h5.parts", job)
     files.save(0, 1, [np.zeros((tiling.count(0, 1) // 301, 301), np.complex64)], skipped)
     (path,) = tiles(tmp_path)
-    assert b'"skipped": {"window": 1180591620717411303424, "beam": 3}' in path.read_bytes()
+    assert b'"tally": {"window": 1180591620717411303424, "beam": 3}' in path.read_bytes()
     assert [(run, n) for run, _, n in files.found(0, tiling.n_bands)] == [((0, 1), skipped)]
 
 
@@ -319,7 +321,7 @@ sys.path.insert(0, {tests!r})
 import os, signal, random
 from helpers.cases import noise_history
 import sarcl
-from sarcl.imaging.run import checkpoint
+from sarcl.blocks import checkpoint
 checkpoint.PERIOD = 0.0
 left = {calls}
 def deadly(call):
@@ -531,7 +533,7 @@ def test_every_field_of_a_task_has_its_part_in_the_fingerprint(raw):
     task, chosen = make_task(raw, GRID, None, None, False, True), planned(raw)
 
     def mark_of(task):
-        return mark(job_of(task, chosen.method, 1e-3, chosen.plan, chosen.tiling, chosen.dtype))
+        return mark(image_job(task, chosen, 1e-3).describe())
 
     @dataclass(frozen=True, eq=False)
     class More(type(task)):

@@ -11,8 +11,8 @@ import pytest
 from helpers.cases import image_error, noise_history
 
 import sarcl
+from sarcl.blocks.workers import cut
 from sarcl.imaging.direct.direct import Direct
-from sarcl.imaging.run.workers import cut
 from sarcl.imaging.tiling.plane import PlaneTiling
 from sarcl.opencl.choose_device import open_device, open_devices
 from sarcl.opencl.device import Device

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...base import text
 from ...base.stage_timer import Clock
+from ...blocks.bands import FlatArray
 from ...numerics import cost_model
 from ...numerics.cost_model import CPU, DeviceClass
 from ...numerics.plan import Plan, cheapest
@@ -20,7 +21,7 @@ from ..focusing_task import FocusingTask
 from ..pixel_taper import TaperOnDevice
 from ..tiling.of_grid import tiling_of
 from ..tiling.plane import LineTiling
-from ..tiling.tiling import FlatImage, Tiling
+from ..tiling.tiling import Tiling
 from . import _shared_line_plan, line_plan
 from .line_plan import LinePlan
 from .tile_kernels import CHUNK, Block, KernelForm, Profiles, Pulses, kernel_of
@@ -89,7 +90,7 @@ class Direct(DirectEngine):
         # per row, making the range profile costs a tenth of adding it to this many pixels: on a CPU, on a GPU, and on a
         # GPU whose profiles the host makes. For GPUs they are inferred from 2e11 pixels/s: none was measured
         each = 400 if device.is_cpu else 3000 if self.profiles.on_device else 50_000
-        self.least_pixels = float(each * plan.length)
+        self.least = float(each * plan.length)
 
     def _shares(self, nbytes: float) -> tuple[float, float, float]:
         """Bytes for range profiles, pixels and constants of tiles: a quarter, a half and a quarter of nbytes.
@@ -113,7 +114,7 @@ class Direct(DirectEngine):
         return max(1, int(self._shares(nbytes)[1] / (pixel_bytes * self.tiling.per_tile)))
 
     def fill(
-        self, first: int, last: int, flat: FlatImage, budget: float, clock: Clock, on_progress: Callable[[float], None]
+        self, first: int, last: int, flat: FlatArray, budget: float, clock: Clock, on_progress: Callable[[float], None]
     ) -> Skipped:
         """Focus bands first ... last - 1 into `flat`; see engine.Engine."""
         tiling = self.tiling

@@ -16,13 +16,14 @@ import numpy as np
 from ...base import float_pairs
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.stage_timer import Clock
+from ...blocks.bands import FlatArray
 from ...opencl.device import Buffer, Device
 from ...opencl.launch_numbers import launch_numbers
 from ..direct.direct import Direct
 from ..direct.tile_kernels import Block, KernelForm, Profiles, Pulses, TilesOnDevice, kernel_of
 from ..engine import Engine, RowProfiles, Skipped
 from ..focusing_task import FocusingTask
-from ..tiling.tiling import FlatImage, Roots, Tiling, Tree
+from ..tiling.tiling import Roots, Tiling, Tree
 from ._memory import MemoryPlan
 from ._tile_coverage import TileCoverage, coverage_of, same_coverage, without
 from .plan import GUARD, FactorPlan, Level, moving_cost
@@ -103,7 +104,7 @@ class Factorized(Engine):
         sigma = 2 * float(task.raw.frequency_step.min()) * plan.length / SPEED_OF_LIGHT
         pad = root.reach - (0 if task.wrap else int(root.radius * sigma)) + 2 * GUARD
         self.profiles = RowProfiles(device, self.task, plan.first, plan.length, pad)
-        self.least_pixels = 1000.0 * plan.length
+        self.least = 1000.0 * plan.length
         self.memory = MemoryPlan(
             plan=plan,
             tiling=tiling,
@@ -138,7 +139,7 @@ class Factorized(Engine):
         return min(self.memory.working(nbytes), nbytes)
 
     def fill(
-        self, first: int, last: int, flat: FlatImage, budget: float, clock: Clock, on_progress: Callable[[float], None]
+        self, first: int, last: int, flat: FlatArray, budget: float, clock: Clock, on_progress: Callable[[float], None]
     ) -> Skipped:
         """Focus bands first ... last - 1 into `flat`; see engine.Engine."""
         tiling, n_rows = self.tiling, self.task.raw.n_rows

@@ -10,6 +10,7 @@ import numpy as np
 from ...base import text
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.stage_timer import Clock
+from ...blocks.bands import FlatArray
 from ...model.phase_history import PhaseHistory
 from ...numerics.double_double import exact_product, exact_sum, quotient
 from ...numerics.pulse_geometry import PulseGeometry
@@ -19,7 +20,7 @@ from ...opencl.launch_numbers import launch_numbers
 from ..engine import DirectEngine, RowProfiles, Skipped
 from ..focusing_task import FocusingTask
 from ..pixel_taper import WEIGHT_BUFFERS, TaperOnDevice
-from ..tiling.tiling import FlatImage, Tiling, download_sums
+from ..tiling.tiling import Tiling, download_sums
 from .plan import CHUNK, Float64Plan
 
 N_CONST = 16  # numbers per pair of tile and pulse: N_CONST of kernels/geometry_float64.clh
@@ -30,7 +31,7 @@ class DirectFloat64(DirectEngine):
     """The loops over blocks of rows and tiles; see engine.Engine. ValueError on a device without float64."""
 
     dtype = np.complex128
-    least_pixels = np.inf
+    least = np.inf
 
     def __init__(self, device: Device, task: FocusingTask, plan: Float64Plan, tiling: Tiling) -> None:
         if not device.info.fp64:
@@ -63,7 +64,7 @@ class DirectFloat64(DirectEngine):
         )
 
     def fill(
-        self, first: int, last: int, flat: FlatImage, budget: float, clock: Clock, on_progress: Callable[[float], None]
+        self, first: int, last: int, flat: FlatArray, budget: float, clock: Clock, on_progress: Callable[[float], None]
     ) -> Skipped:
         """Focus bands first ... last - 1 into `flat`; see engine.Engine."""
         raw, tiling, middle = self.task.raw, self.tiling, self.task.raw.n_rows // 2

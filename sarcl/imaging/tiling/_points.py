@@ -9,10 +9,11 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from ...base.morton import morton_order
+from ...blocks.bands import FlatArray, Run
 from ...model.image_grid import ImageGrid
 from ...numerics.tiles import Tiles, tile_points
 from ...opencl.device import Buffer, Device
-from .tiling import FlatImage, Orders, Part, Roots, Run, Section, Tiling, Tree
+from .tiling import Orders, Part, Roots, Section, Tiling, Tree
 
 LISTED = 2**18  # points of a band, the unit in which an image is made and its tiles are kept
 KEPT = 2**25  # points of a grid whose order is kept, in 4 bytes each
@@ -102,7 +103,7 @@ class PointTiling(Tiling):
         parts = [self._points(b)[order] for b, order in zip(range(first, last), orders, strict=True)]
         return np.concatenate(parts).reshape(-1, self.per_tile, 3)
 
-    def place(self, values: np.ndarray, run: Run, start: int, orders: Orders, flat: FlatImage) -> None:
+    def place(self, values: np.ndarray, run: Run, start: int, orders: Orders, flat: FlatArray) -> None:
         skipped, taken = start * self.per_tile, 0  # values before those given, and those placed
         for band, order in zip(range(*run), orders, strict=True):
             assert order is not None
@@ -156,7 +157,7 @@ class PointTiling(Tiling):
                 below = tree.part(part.low, part.high)
                 yield Section(part, below, roots, np.arange(part.low, part.high), sizes[below.slot], orders)
 
-    def place_section(self, device: Device, sums: Buffer, section: Section, flat: FlatImage) -> None:
+    def place_section(self, device: Device, sums: Buffer, section: Section, flat: FlatArray) -> None:
         slot = section.tree.slot
         self.place_sums(device, sums, section.part[:2], (slot[0], slot[-1] + 1), section.orders, flat)
 

@@ -8,11 +8,12 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 import numpy as np
 
 from ...base import float_pairs
+from ...blocks.bands import FlatArray, Run
 from ...model.image_grid import ImageGrid
 from ...numerics.tiles import Tiles
 from ...opencl.device import Buffer, Device
 from ...opencl.launch_numbers import launch_numbers
-from .tiling import FlatImage, Orders, Part, Roots, Run, Section, Tiling, Tree
+from .tiling import Orders, Part, Roots, Section, Tiling, Tree
 
 
 def _power_of_two(n: int) -> int:
@@ -82,7 +83,7 @@ class PlaneTiling(Tiling):
         positions = self.grid.at(i[:, None], j).reshape(last - first, self.high, self.across, self.wide, 3)
         return positions.transpose(0, 2, 1, 3, 4).reshape(-1, self.per_tile, 3)
 
-    def place(self, values: np.ndarray, run: Run, start: int, orders: Orders, flat: FlatImage) -> None:
+    def place(self, values: np.ndarray, run: Run, start: int, orders: Orders, flat: FlatArray) -> None:
         n_bands, columns, rows = run[1] - run[0], self.grid.shape[1], self.extent(*run)
         across = len(values) // self.per_tile // n_bands
         first_column, right = start * self.wide, min((start + across) * self.wide, columns)
@@ -91,7 +92,7 @@ class PlaneTiling(Tiling):
         flat[rows, first_column:right] = block[: rows.stop - rows.start, : right - first_column]
 
     def place_sums(
-        self, device: Device, sums: Buffer, run: Run, tiles: tuple[int, int], orders: Orders, flat: FlatImage
+        self, device: Device, sums: Buffer, run: Run, tiles: tuple[int, int], orders: Orders, flat: FlatArray
     ) -> None:
         if tiles == (0, (run[1] - run[0]) * self.across):
             self._write(device, sums, run, None, flat)
@@ -99,7 +100,7 @@ class PlaneTiling(Tiling):
             super().place_sums(device, sums, run, tiles, orders, flat)
 
     def _write(
-        self, device: Device, sums: Buffer, run: Run, slot: np.ndarray | None, flat: FlatImage, left: int = 0
+        self, device: Device, sums: Buffer, run: Run, slot: np.ndarray | None, flat: FlatArray, left: int = 0
     ) -> None:
         """Write the rows of a run of bands to the flat image, from compensated sums (4, pixels) on the device.
 
@@ -199,7 +200,7 @@ class PlaneTiling(Tiling):
         columns.grid = self.grid.columns(part.low * self.wide, min(part.high * self.wide, self.grid.shape[1]))
         return columns
 
-    def place_section(self, device: Device, sums: Buffer, section: Section, flat: FlatImage) -> None:
+    def place_section(self, device: Device, sums: Buffer, section: Section, flat: FlatArray) -> None:
         part = section.part
         self._columns(part)._write(device, sums, part[:2], section.tree.slot, flat, part.low * self.wide)
 

@@ -8,21 +8,13 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from ...blocks.bands import FlatArray, Run
 from ...model.image_grid import ImageGrid
 from ...numerics.tiles import Tiles
 from ...opencl.device import Buffer, Device
 from ...opencl.launch_numbers import launch_numbers
 
-Run = tuple[int, int]  # bands first ... last - 1
 Orders = Sequence[np.ndarray | None]  # for each band: cell of the band that each point of its tiles is; None: a plane
-
-
-class FlatImage(Protocol):
-    """Rows of a plane, or listed points, in the order of the bands: an array, a dataset of a file, or a BandBuffer."""
-
-    def __getitem__(self, rows: slice, /) -> np.ndarray: ...
-
-    def __setitem__(self, at: slice | tuple[slice, slice], block: np.ndarray, /) -> None: ...
 
 
 class Part(NamedTuple):
@@ -115,7 +107,7 @@ class Tiling(Protocol):
     def positions(self, first: int, last: int, orders: Orders) -> np.ndarray:
         """Positions, m (n_tiles, per_tile, 3), of bands first ... last - 1: those of the grid to the bit."""
 
-    def place(self, values: np.ndarray, run: Run, start: int, orders: Orders, flat: FlatImage) -> None:
+    def place(self, values: np.ndarray, run: Run, start: int, orders: Orders, flat: FlatArray) -> None:
         """Write values (n,) of tiles from `start` on of a run of bands to their pixels in the flat image.
 
         The tiles are all of the run, or some of a run of one band.
@@ -137,7 +129,7 @@ class Tiling(Protocol):
     def sections(self, parts: Iterable[Part], factors: Sequence[int]) -> Iterator[Section]:
         """Parts with their trees; `factors` as of `tree`."""
 
-    def place_section(self, device: Device, sums: Buffer, section: Section, flat: FlatImage) -> None:
+    def place_section(self, device: Device, sums: Buffer, section: Section, flat: FlatArray) -> None:
         """Write compensated sums (4, pixels) on the device to the pixels of a section in the flat image."""
 
     def n_roots(self, first: int, last: int, factor: int) -> int:
@@ -193,7 +185,7 @@ class Tiling(Protocol):
         return joined, orders
 
     def place_sums(
-        self, device: Device, sums: Buffer, run: Run, tiles: tuple[int, int], orders: Orders, flat: FlatImage
+        self, device: Device, sums: Buffer, run: Run, tiles: tuple[int, int], orders: Orders, flat: FlatArray
     ) -> None:
         """Write compensated sums (4, pixels) on the device of tiles start ... stop - 1 of a run, as `place` does."""
         start, stop = tiles

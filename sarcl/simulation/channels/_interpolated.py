@@ -8,6 +8,7 @@ elements, and some twenty pairs of positions for 450 transmitting by 450 receivi
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -23,8 +24,8 @@ from ...numerics import cost_model
 from ...numerics.pulse_geometry import PulseGeometry
 from ...scattering.antenna_weights import AntennaWeights
 from ...scene.scene import Scene
-from ..scene_echoes import Added, SceneEchoes, band_of
-from ..spreading import Band
+from ..scene_echoes import Added, ChannelEchoes, SceneEchoes, band_of
+from ..spreading import Band, most_pulses
 from ._chebyshev_positions import Positions, choose_positions
 from ._response_samples import ResponseSamples
 from ._separate import ChannelLayout, active_channels, echoes_of
@@ -50,9 +51,7 @@ class InterpolatedChannels:
         rows, self.layout, self.center = layout.rows, layout, scene.center
         self.own = rows.receive == "own"
         # + 0.0: so that 0 and -0 are one position
-        offsets = np.array([c.offset for c in layout.sent]) + 0.0
-        self.transmitters, index = np.unique(offsets, axis=0, return_inverse=True)
-        self.transmitter_of = dict(zip(map(id, layout.sent), index.ravel().tolist(), strict=True))
+        self.transmitters = np.unique(np.array([c.offset for c in layout.sent]) + 0.0, axis=0)
         self.receivers = self.transmitters if self.own else rows.receivers
         # errors of channels add up where the channels are summed
         together = float(np.sqrt(layout.overlap))
@@ -73,6 +72,7 @@ class InterpolatedChannels:
         self.error = together * (self.tx.error + self.tx.growth * self.rx.error)
         self.tolerance = (tolerance - self.error) / self.growth
         self.runs = len(self.tx) * len(self.rx) * len(rows.track)
+        self._planned: dict[tuple[int, ...], tuple[ChannelEchoes, np.ndarray]] = {}
 
     @property
     def interpolates(self) -> bool:
@@ -146,6 +146,17 @@ class InterpolatedChannels:
         """Band of all computed echoes: the whole band."""
         return [self.layout.band(self.layout.frequencies)]
 
+    def least(self, scene: SceneEchoes) -> float:
+        """Pulses of a block, at least; by levels all blocks repeat the work on small cells."""
+        by_levels = any(channel.apart()[1] for _, channel, _ in self._pairs(scene))
+        return np.inf if by_levels else most_pulses(scene.request.device)
+
+    def fresh(self) -> InterpolatedChannels:
+        """The same for another device: nothing is planned yet."""
+        other = copy.copy(self)
+        other._planned = {}
+        return other
+
     def pulses(self, budget: float) -> int:
         """Pulses per call of `fill`: echoes at the positions and those of one channel take half the budget, bytes."""
         rows, grid = self.layout.rows, self.layout.grid
@@ -159,12 +170,13 @@ class InterpolatedChannels:
         layout, rows, added = self.layout, self.layout.rows, Added()
         frequencies = layout.frequencies
         echoes = np.empty((len(self.tx), len(self.rx), len(samples), samples.shape[3], layout.grid.n), np.complex64)
-        for (i, j), geometry, band, rounded in self._pairs(start, len(samples)):
+        pulses = range(start, start + len(samples))
+        for (i, j), at_pair, rounded in self._pairs(scene):
             before = done + added.counts.pairs
-            echoes[i, j], at_position = echoes_of(scene, geometry, band, frequencies, start, before, total)
+            echoes[i, j], at_position = echoes_of(at_pair, pulses, len(frequencies), before, total)
             added += at_position
             if np.abs(rounded).max() * frequencies[-1] > 1e-9 * SPEED_OF_LIGHT:  # thousands of kilometres away
-                echoes[i, j] *= _phase(-rounded, frequencies)[:, None]
+                echoes[i, j] *= _phase(-rounded[pulses.start : pulses.stop], frequencies)[:, None]
         shared = (
             None
             if self.own
@@ -179,27 +191,34 @@ class InterpolatedChannels:
         scene.request.clock.lap("channels")
         return replace(added, error_terms=self.between(added.error_terms))
 
-    def planned(self, scene: SceneEchoes, start: int, n: int) -> Added:
-        """The plan of the echoes of n pulses from `start` on, without these."""
+    def planned(self, scene: SceneEchoes) -> Added:
+        """The plan of the echoes of all pulses, without these."""
         added = Added()
-        for _, geometry, band, _ in self._pairs(start, n):
-            channel = scene.channel(geometry, band, self.layout.frequencies, start)
+        for _, channel, _ in self._pairs(scene):
             added += Added(channel.error_terms, channel.plan)
         return replace(added, error_terms=self.between(added.error_terms))
 
-    def _pairs(self, start: int, n: int) -> Iterator[tuple[tuple[int, int], PulseGeometry, Waveform, np.ndarray]]:
-        """Pairs of positions: numbers, geometry of n pulses from `start` on, band, rounding of the paths, m (n,)."""
-        layout, rows, at = self.layout, self.layout.rows, slice(start, start + n)
+    def _pairs(self, scene: SceneEchoes) -> Iterator[tuple[tuple[int, int], ChannelEchoes, np.ndarray]]:
+        """Pairs of positions: numbers, plan of the echoes of all pulses, rounding of the paths, m (n_pulses,)."""
+        for pair in np.ndindex(len(self.tx), len(self.rx)):
+            if pair not in self._planned:
+                geometry, band, rounded = self._geometry(*pair)
+                self._planned[pair] = scene.channel(geometry, band, self.layout.frequencies), rounded
+            channel, rounded = self._planned[pair]
+            yield (pair[0], pair[1]), channel.of(scene), rounded
+
+    def _geometry(self, i: int, j: int) -> tuple[PulseGeometry, Waveform, np.ndarray]:
+        """Geometry of all pulses at a pair of positions, band, and rounding of the paths, m (n_pulses,)."""
+        layout, rows = self.layout, self.layout.rows
         grid, frequencies = layout.grid, layout.frequencies
         band = band_of(layout.waveform, float(frequencies.mean()), grid.n * grid.step)
         reach = SPEED_OF_LIGHT / (4 * grid.step)
-        for i, j in np.ndindex(len(self.tx), len(self.rx)):
-            tx = rows.tx_positions(self.tx.at[i], at)
-            rx = rows.rx_positions(self.tx.at[i] if self.own else self.rx.at[j], at)
-            path = _length(tx, self.center) + _length(rx, self.center)
-            reference = np.asarray(path / 2, np.float64)
-            geometry = layout.geometry(tx, rx, reference, frequencies, (-reach, reach))
-            yield (i, j), geometry, band, np.asarray(path - 2 * reference, np.float64)
+        tx = rows.tx_positions(self.tx.at[i])
+        rx = rows.rx_positions(self.tx.at[i] if self.own else self.rx.at[j])
+        path = _length(tx, self.center) + _length(rx, self.center)
+        reference = np.asarray(path / 2, np.float64)
+        geometry = layout.geometry(tx, rx, reference, frequencies, (-reach, reach))
+        return geometry, band, np.asarray(path - 2 * reference, np.float64)
 
     def between(self, terms: tuple[ErrorTerm, ...]) -> tuple[ErrorTerm, ...]:
         """Error terms of channels interpolated between positions where echoes have these."""
@@ -223,12 +242,14 @@ class InterpolatedChannels:
         """
         layout, rows = self.layout, self.layout.rows
         part, frequencies = layout.samples(channel)
-        number, part_of_band = self.transmitter_of[id(channel)], echoes[..., layout.grid.part(channel.carrier)]
+        number = int(np.flatnonzero((self.transmitters == channel.offset).all(axis=1))[0])
+        part_of_band = echoes[..., layout.grid.part(channel.carrier)]
         if self.tx.basis is None:
             some = part_of_band[number]
         else:
-            some = np.tensordot(self.tx.basis[number].astype(np.float32), part_of_band, 1)
-        every = some if self.rx.basis is None else np.tensordot(self.rx.basis.astype(np.float32), some, 1)
+            some = np.einsum("k,k...->...", self.tx.basis[number].astype(np.float32), part_of_band)
+        # no BLAS: its sums depend on how many pulses there are
+        every = some if self.rx.basis is None else np.einsum("jk,k...->j...", self.rx.basis.astype(np.float32), some)
         values = np.moveaxis(every, 0, 1)
         tx = rows.tx_positions(channel.offset, at)
         tx_to_reference = np.linalg.norm((tx if rows.separated else rows.track.tx[at]) - rows.point, axis=-1)

@@ -12,9 +12,11 @@ from ...arrays.channels import Channel, Sampling
 from ...base.report import ErrorTerm
 from ...model.waveform import Waveform
 from ...numerics.pulse_geometry import PulseGeometry
-from ..scene_echoes import Added, SceneEchoes, band_of
+from ..scene_echoes import Added, ChannelEchoes, SceneEchoes, band_of
 from ..spreading import Band
 from ._channel_rows import ChannelRows
+
+MOST_BLOCKS = 16  # of pulses, about: each plans all channels anew
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,9 +90,10 @@ class ChannelLayout:
 
 
 class ChannelPlace(NamedTuple):
-    """One channel at one receiver, at consecutive pulses.
+    """One channel at one receiver, at the pulses at which it is sent, and some of these.
 
-    first   number of its first pulse in the track;  pulses  the pulses in a block;  samples  in a row
+    first   number of its first pulse in the track;  some  pulses of a block, counted from there;  here  the same in
+            the block;  samples  in a row
     """
 
     channel: Channel
@@ -98,7 +101,8 @@ class ChannelPlace(NamedTuple):
     band: Waveform
     frequencies: np.ndarray
     first: int
-    pulses: slice
+    some: range
+    here: slice
     receiver: slice
     samples: slice
 
@@ -115,6 +119,14 @@ class SeparateChannels:
         made = [self.layout.samples(channel)[1] for channel in self.layout.sent]
         return [self.layout.band(frequencies) for frequencies in made]
 
+    def least(self, scene: SceneEchoes) -> float:
+        """Pulses of a block, at least: each plans all channels anew."""
+        return len(self.layout.rows.track) / MOST_BLOCKS
+
+    def fresh(self) -> SeparateChannels:
+        """The same for another device: nothing is kept."""
+        return self
+
     def pulses(self, budget: float) -> int:
         """Pulses per call of `fill`: all of them, since each computation keeps to the memory budget by itself."""
         return len(self.layout.rows.track)
@@ -127,18 +139,17 @@ class SeparateChannels:
         added, rows = Added(), self.layout.rows
         for one in self._places(start, len(samples)):
             spectrum = self.layout.spectrum(one.channel, one.frequencies) * scene.weights.factor(one.frequencies)
-            echoes, of_channel = echoes_of(
-                scene, one.geometry, one.band, one.frequencies, one.first, done + added.counts.pairs, total
-            )
+            planned = scene.channel(one.geometry, one.band, one.frequencies, one.first)
+            echoes, of_channel = echoes_of(planned, one.some, len(one.frequencies), done + added.counts.pairs, total)
             added += of_channel
             shaped = (echoes * spectrum.astype(np.complex64))[:, None]
-            rows.add(samples[one.pulses], one.channel, one.receiver, one.samples, shaped)
+            rows.add(samples[one.here], one.channel, one.receiver, one.samples, shaped)
         return added
 
-    def planned(self, scene: SceneEchoes, start: int, n: int) -> Added:
-        """The plan of the echoes of n pulses from `start` on, without these."""
+    def planned(self, scene: SceneEchoes) -> Added:
+        """The plan of the echoes of all pulses, without these."""
         added = Added()
-        for one in self._places(start, n):
+        for one in self._places(0, len(self.layout.rows.track)):
             channel = scene.channel(one.geometry, one.band, one.frequencies, one.first)
             added += Added(channel.error_terms, channel.plan)
         return added
@@ -149,11 +160,15 @@ class SeparateChannels:
         for channel, at, here in active_channels(layout.sent, start, n):
             part, frequencies = layout.samples(channel)
             band = band_of(layout.waveform, channel.carrier, len(frequencies) * layout.grid.step)
-            tx = rows.tx_positions(channel.offset, at)
-            _, rx, reference = rows.ends(channel.offset, at)
+            every = slice(channel.first, channel.stop)  # planned alike for all blocks
+            some = range(at.start - channel.first, at.stop - channel.first)
+            tx = rows.tx_positions(channel.offset, every)
+            _, rx, reference = rows.ends(channel.offset, every)
             for j in range(rows.n_receivers):
                 geometry = layout.geometry(tx, rx[:, j], reference[:, j], frequencies)
-                yield ChannelPlace(channel, geometry, band, frequencies, at.start, here, slice(j, j + 1), part)
+                yield ChannelPlace(
+                    channel, geometry, band, frequencies, channel.first, some, here, slice(j, j + 1), part
+                )
 
     def between(self, terms: tuple[ErrorTerm, ...]) -> tuple[ErrorTerm, ...]:
         """Error terms of the channels where their echoes have these: the same."""
@@ -174,13 +189,8 @@ def active_channels(sent: list[Channel], start: int, n: int) -> list[tuple[Chann
     return out
 
 
-def echoes_of(
-    scene: SceneEchoes, geometry: PulseGeometry, band: Waveform, frequencies: np.ndarray, first: int, done: int,
-    total: int,
-) -> tuple[np.ndarray, Added]:  # fmt: skip
-    """Echoes (n, n_polarizations, n_samples) of the scene at n pulses from `first` on, without the pulse's spectrum."""
-    n = len(geometry)
-    out = np.zeros((n, len(scene.request.polarizations), len(frequencies)), np.complex64)
-    channel = scene.channel(geometry, band, frequencies, first)
-    counts = channel.add(out, range(n), done, total)
+def echoes_of(channel: ChannelEchoes, pulses: range, n_samples: int, done: int, total: int) -> tuple[np.ndarray, Added]:
+    """Echoes (n, n_polarizations, n_samples) at n consecutive pulses of a channel, without the pulse's spectrum."""
+    out = np.zeros((len(pulses), len(channel.scene.request.polarizations), n_samples), np.complex64)
+    counts = channel.add(out, pulses, done, total)
     return out, Added(channel.error_terms, channel.plan, counts)

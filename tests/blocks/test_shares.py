@@ -11,9 +11,9 @@ from helpers.cases import noise_history
 from helpers.devices import as_gpu
 
 import sarcl
+from sarcl.blocks._shares import Shares, Worker
 from sarcl.imaging import backproject as backproject_file
 from sarcl.imaging.engine import RowProfiles
-from sarcl.imaging.run._shares import Shares, Worker
 from sarcl.opencl.choose_device import open_device
 from sarcl.opencl.device import Device
 
@@ -86,7 +86,7 @@ def test_a_device_that_would_take_less_than_half_a_block_takes_none():
 
 
 def test_profiles_cost_a_tenth_at_most():
-    # a block of least_pixels takes ten times as long as the profiles before it
+    # a block of the least size takes ten times as long as the profiles before it
     for n in (2, 3):
         _, end = simulate([1e4] * n, profiles=0.1, least=1e4)
         assert max(end) <= 1.15 * 40 / n

@@ -1,4 +1,4 @@
-"""Division of the bands of an image among devices: each takes what it can make until all end together."""
+"""Division of the bands of a result among devices: each takes what it can make until all end together."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ import time
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from ..tiling.tiling import Run, Tiling
+from .bands import Bands, Run
 
 SURE = 0.75  # part of its share that a device of known speed takes at a time: the rest corrects the division
 UNSURE = 0.25  # the same for one whose speed was measured with another kernel
-WORTH = 0.25  # part of an engine's `least_pixels` that must be left over after UNSURE to be divided again
+WORTH = 0.25  # part of an engine's `least` that must be left over after UNSURE to be divided again
 LITTLE = 0.05  # part of its share by which a device may take more, to end at a whole band
 
 
 class Worker(NamedTuple):
-    """A device: bands that its blocks may not cross, Engine.least_pixels, and its speed relative to the others'.
+    """A device: bands that its blocks may not cross, Engine.least, and its speed relative to the others'.
 
     Equal speeds are taken for certain.
     """
@@ -29,15 +29,15 @@ class Worker(NamedTuple):
 class Shares:
     """Bands that several devices take one block after the other, each block as large as the device's speed asks for.
 
-    A block makes the range profiles of all rows anew, so that blocks are few: a device that is free takes its share of
-    what is left, or most of it where the rest is worth a block of its own. Shares are such that all devices end at the
-    same time, at the speeds that they have shown so far. A device whose share is less than half the smallest block
-    takes no more.
+    A block repeats some of the work, such as the range profiles of all rows, so that blocks are few: a device that is
+    free takes its share of what is left, or most of it where the rest is worth a block of its own. Shares are such
+    that all devices end at the same time, at the speeds that they have shown so far. A device whose
+    share is less than half the smallest block takes no more.
     """
 
     def __init__(
         self,
-        tiling: Tiling,
+        bands: Bands,
         todo: list[Run],
         devices: Sequence[Worker],
         *,
@@ -45,12 +45,12 @@ class Shares:
         unit: int,
         now: Callable[[], float] = time.monotonic,
     ) -> None:
-        """most  pixels of a block, at most;  unit  blocks begin at multiples of so many bands if possible"""
-        self.tiling, self.most, self.unit, self.devices = tiling, most, unit, devices
+        """most  units of work of a block, at most;  unit  blocks begin at multiples of so many bands if possible"""
+        self.bands, self.most, self.unit, self.devices = bands, most, unit, devices
         rates = [device.rate for device in devices]
         self._left, self._rates, self._now = list(todo), rates, now
         self._alike = min(rates) == max(rates)
-        self._taken, self._done, self._busy = ([0.0] * len(rates) for _ in range(3))  # pixels, pixels, s
+        self._taken, self._done, self._busy = ([0.0] * len(rates) for _ in range(3))  # units of work, the same, s
         self._began: list[float | None] = [None] * len(rates)
         self._active = [True] * len(rates)
         self.lost: set[int] = set()  # devices that have failed
@@ -65,7 +65,7 @@ class Shares:
             if block is None:
                 self._active[k] = False
                 return None
-            self._taken[k] += self.tiling.count(*block)
+            self._taken[k] += self.bands.count(*block)
             self._began[k] = self._now()
             return block
 
@@ -81,10 +81,10 @@ class Shares:
             for j in self.lost:
                 self._active[j] = False
 
-    def made(self, k: int, pixels: float) -> None:
-        """Device k has made so many pixels, or an equal part of the work on more."""
+    def made(self, k: int, units: float) -> None:
+        """Device k has done so many units of work, or an equal part of the work on more."""
         with self._lock:
-            self._done[k] = max(self._done[k], pixels)
+            self._done[k] = max(self._done[k], units)
 
     def _stop(self, k: int) -> None:
         began = self._began[k]
@@ -93,7 +93,7 @@ class Shares:
             self._done[k], self._began[k] = self._taken[k], None
 
     def _speeds(self) -> list[float]:
-        """Pixels per second of each device: as shown, or in proportion to those that have shown theirs."""
+        """Units of work per second of each device: as shown, or in proportion to those that have shown theirs."""
         shown: list[float | None] = []
         for done, busy, began in zip(self._done, self._busy, self._began, strict=True):
             seconds = busy + (0.0 if began is None else self._now() - began)
@@ -103,8 +103,8 @@ class Shares:
         return [rate * scale if v is None else v for v, rate in zip(shown, self._rates, strict=True)]
 
     def _part(self, k: int) -> float:
-        """Pixels that device k should take now."""
-        remainder, speeds = float(sum(self.tiling.count(*run) for run in self._left)), self._speeds()
+        """Units of work that device k should take now."""
+        remainder, speeds = float(sum(self.bands.count(*run) for run in self._left)), self._speeds()
         # seconds from now at which each device is free, and when all end if they share what is left
         active = [j for j in range(len(speeds)) if self._active[j]]
         free = {j: (self._taken[j] - self._done[j]) / speeds[j] if j != k else 0.0 for j in active}
@@ -121,14 +121,14 @@ class Shares:
         worth = self.devices[k].least if sure else WORTH * self.devices[k].least
         return share - rest if rest >= worth and len(free) > 1 else share
 
-    def _block(self, k: int, pixels: float) -> Run | None:
-        """About so many pixels from the first band on that is left, or None where that is less than half a block."""
+    def _block(self, k: int, units: float) -> Run | None:
+        """About so many units of work from the first band that is left; None where that is less than half a block."""
         first, stop = self._left[0]
         stop = min([e for e in self.devices[k].ends if e > first] + [stop])
-        size, count = min(pixels, self.most), self.tiling.count
+        size, count = min(units, self.most), self.bands.count
         last = stop
         if count(first, stop) > size:
-            low, high = first, stop  # the last band with which the block has `size` pixels at most
+            low, high = first, stop  # the last band with which the block has `size` units at most
             while high - low > 1:
                 middle = (low + high) // 2
                 low, high = (middle, high) if count(first, middle) <= size else (low, middle)
@@ -136,10 +136,10 @@ class Shares:
             above = min((below // self.unit + 1) * self.unit, stop)
             over = count(first, above) - size
             # a little more than the share, so that no few bands are left over, whose profiles would cost more
-            fits = pixels <= self.most and (over <= LITTLE * size or over <= size - count(first, below))
+            fits = units <= self.most and (over <= LITTLE * size or over <= size - count(first, below))
             last = above if fits or below == first else below
         others = any(active for j, active in enumerate(self._active) if j != k)
-        if others and pixels < count(first, last) / 2:
+        if others and units < count(first, last) / 2:
             return None
         self._left[0] = last, self._left[0][1]
         if self._left[0][0] == self._left[0][1]:

@@ -9,16 +9,15 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...base.types import PathLike
-from ...io import formats, output_paths
-from ...io.hdf5 import BLOCK_BYTES
-from ...model import store
-from ...model.image import Image
-from ..choose_method import MethodChoice
-from ..engine import Skipped
-from ..focusing_task import FocusingTask
-from ..tiling.tiling import FlatImage, Run
-from .tile_files import TileStore, discard, folder_of, gaps, job_of
+from ..base.types import PathLike
+from ..io import formats, output_paths
+from ..io.hdf5 import BLOCK_BYTES
+from ..model import store
+from ..model.image import Image
+from ..model.phase_history import PhaseHistory
+from .bands import FlatArray, Run, Tally
+from .block_job import BlockJob
+from .tile_files import TileStore, discard, folder_of, gaps
 
 log = logging.getLogger(__name__)
 
@@ -26,41 +25,40 @@ PERIOD = 1.0  # s: a run that ends sooner writes no tile files
 WORTH = 60.0  # s: a run that fails or is interrupted sooner removes its tile files, unless resume=True
 
 
-def _parts(flat: FlatImage, at: slice, row_bytes: int) -> Iterator[np.ndarray]:
-    """Rows `at` of ImageOutput.flat or of a BandBuffer, of row_bytes each, some at a time: they may lie in a file."""
+def _parts(flat: FlatArray, at: slice, row_bytes: int) -> Iterator[np.ndarray]:
+    """Rows `at` of the flat array or of a BandBuffer, of row_bytes each, some at a time: they may lie in a file."""
     step = max(1, BLOCK_BYTES // row_bytes)
     for start in range(at.start, at.stop, step):
         yield flat[start : min(start + step, at.stop)]
 
 
 class Checkpoint:
-    """Keeps the finished tiles of the image `path` in files, as `resume` says.
+    """Keeps the finished bands of the result `path` in files, as `resume` says.
 
     True   always, also where the run ends in an exception
     None   from PERIOD seconds on, so that a killed run loses no finished tile; a run that ends in an exception before
            WORTH seconds removes the files that it wrote, unless its devices were lost
     False  never; the files of earlier runs are deleted by `begin`
 
-    The constructor reads all samples where there are tile files, or resume is True. ValueError: the files belong to
-    another job. As a context manager it ends with the run: an exception in its block is one that ended the run.
+    The constructor describes the job where there are tile files, or resume is True: for an image it reads all samples.
+    ValueError: the files belong to another job. As a context manager it ends with the run: an exception in its block is
+    one that ended the run.
     """
 
-    def __init__(
-        self, path: PathLike, task: FocusingTask, chosen: MethodChoice, tolerance: float, resume: bool | None
-    ) -> None:
-        self.path, self.task, self.chosen, self.tolerance = path, task, chosen, tolerance
+    def __init__(self, path: PathLike, job: BlockJob, resume: bool | None) -> None:
+        self.path, self.job = path, job
         self.folder, self.resume = folder_of(path), resume
         self.tiles: TileStore | None = None
         self.begun = time.monotonic()
         self.fresh, self._are_lost = True, False
-        self._waiting: list[tuple[int, int, Skipped]] = []
-        self._row_bytes = np.dtype(chosen.dtype).itemsize * math.prod(chosen.tiling.row_shape)
+        self._waiting: list[tuple[int, int, Tally]] = []
+        self._row_bytes = np.dtype(job.dtype).itemsize * math.prod(job.bands.row_shape)
         if resume is not False and (resume or self.folder.exists()):
             output_paths.check_writable(path)
             self._open()
 
     def begin(self) -> None:
-        """Delete the files of earlier runs where resume is False: this run alone makes the image now."""
+        """Delete the files of earlier runs where resume is False: this run alone makes the result now."""
         if self.resume is False:
             discard(self.folder)
 
@@ -69,32 +67,31 @@ class Checkpoint:
         """Fingerprint of the job, or None where no tile files were needed."""
         return self.tiles.mark if self.tiles else None
 
-    def finished(self) -> Image | None:
-        """The image, if this very job has completed it already."""
-        if self.mark is None or formats.writer_functions(self.path, "image").job_of(self.path) != self.mark:
+    def finished(self) -> Image | PhaseHistory | None:
+        """The result, if this very job has completed it already."""
+        if self.mark is None or formats.writer_functions(self.path, self.job.kind).job_of(self.path) != self.mark:
             return None
         self.done()
-        image = store.read(self.path)
-        return image if isinstance(image, Image) else None
+        return store.read(self.path)
 
     def complete(self) -> bool:
         """Whether every band has a tile file."""
-        return self.tiles is not None and not gaps(self.tiles.runs(), 0, self.chosen.tiling.n_bands)
+        return self.tiles is not None and not gaps(self.tiles.runs(), 0, self.job.bands.n_bands)
 
-    def found(self, first: int, last: int) -> Iterator[tuple[Run, np.ndarray, Skipped]]:
+    def found(self, first: int, last: int) -> Iterator[tuple[Run, np.ndarray, Tally]]:
         """Tiles of earlier runs; see TileStore.found."""
         if self.tiles is not None:
             yield from self.tiles.found(first, last)
 
-    def keep(self, first: int, last: int, flat: FlatImage, skipped: Skipped) -> None:
-        """Bands first ... last - 1 are finished in `flat` (ImageOutput.flat, or a BandBuffer of just them)."""
+    def keep(self, first: int, last: int, flat: FlatArray, tally: Tally) -> None:
+        """Bands first ... last - 1 are finished in `flat` (the flat array, or a BandBuffer of just them)."""
         if self.resume is False:
             return
-        self._waiting.append((first, last, skipped))
+        self._waiting.append((first, last, tally))
         if self.tiles is not None or time.monotonic() - self.begun >= PERIOD:
             self._write(flat)
 
-    def rescue(self, flat: FlatImage) -> None:
+    def rescue(self, flat: FlatArray) -> None:
         """The devices are lost: finished tiles, in `flat`, stay however short the run was."""
         if self.resume is False:
             return
@@ -102,11 +99,11 @@ class Checkpoint:
         if self._waiting:
             self._write(flat)
 
-    def _write(self, flat: FlatImage) -> None:
+    def _write(self, flat: FlatArray) -> None:
         try:
             tiles = self.tiles or self._open()
             for a, b, n in self._waiting:
-                tiles.save(a, b, _parts(flat, self.chosen.tiling.extent(a, b), self._row_bytes), n)
+                tiles.save(a, b, _parts(flat, self.job.bands.extent(a, b), self._row_bytes), n)
         except (OSError, TypeError) as exc:
             if self.resume:
                 raise
@@ -115,7 +112,7 @@ class Checkpoint:
         self._waiting.clear()
 
     def done(self) -> None:
-        """Remove the tile files: the image is complete."""
+        """Remove the tile files: the result is complete."""
         if self.tiles is not None:
             self.tiles.clear()
 
@@ -132,10 +129,8 @@ class Checkpoint:
 
     def _open(self) -> TileStore:
         self.fresh = not self.folder.exists()
-        chosen = self.chosen
-        job = job_of(self.task, chosen.method, self.tolerance, chosen.plan, chosen.tiling, chosen.dtype)
         try:
-            self.tiles = TileStore(self.folder, job, chosen.tiling, chosen.dtype)
-        except FileNotFoundError:  # another run has just completed the image and taken the folder away
-            self.tiles = TileStore(self.folder, job, chosen.tiling, chosen.dtype)
+            self.tiles = TileStore(self.folder, self.job)
+        except FileNotFoundError:  # another run has just completed the result and taken the folder away
+            self.tiles = TileStore(self.folder, self.job)
         return self.tiles

@@ -1,34 +1,35 @@
-"""The workers that focus blocks of tiles: one device, or several that take their shares."""
+"""The workers that compute blocks of bands: one device, or several that take their shares."""
 
 from __future__ import annotations
 
 import logging
 import queue
 import threading
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from ...base.stage_timer import Clock
-from ...opencl.failures import DeviceFailed
-from ..engine import Engine, Skipped
-from ..tiling.tiling import FlatImage, Run, Tiling
+from ..base.stage_timer import Clock
+from ..opencl.device_list import DeviceInfo
+from ..opencl.failures import DeviceFailed
 from ._shares import Shares, Worker
+from .bands import Bands, Engine, FlatArray, Run, Tally
+from .block_job import BlockJob
 
 log = logging.getLogger(__name__)
 
-FinishedBlock = tuple[int, int, FlatImage, Skipped]  # a run of bands, where its pixels are, and pairs skipped
-OutputFor = Callable[[int, int], FlatImage]  # destination of the pixels of a run of bands: a flat image or a BandBuffer
+FinishedBlock = tuple[int, int, FlatArray, Tally]  # a run of bands, where its values are, and its tally
+OutputFor = Callable[[int, int], FlatArray]  # destination of the values of a run: the flat array or a BandBuffer
 
 
 class Work(NamedTuple):
-    """Bands to be focused in blocks.
+    """Bands to be computed in blocks.
 
     todo         runs of bands
-    most         pixels of a block at most, about;  unit  blocks begin at multiples of so many bands if possible
+    most         units of work of a block at most, about;  unit  blocks begin at multiples of so many bands if possible
     output_for   called as output_for(first, last): the destination of a run
-    on_progress  called from the caller's thread with the number of (row, pixel) pairs done so far
+    on_progress  called from the caller's thread with the number of contributions done so far
     """
 
     todo: list[Run]
@@ -40,30 +41,32 @@ class Work(NamedTuple):
 
 
 class WorkerPool(Protocol):
-    """Workers that focus the tiles of one task.
+    """Workers that compute the bands of one job.
 
-    size          number of blocks that are focused at once
-    names         names of the devices
-    least_pixels  pixels per block below which a pixel costs noticeably more
+    size   number of blocks that are computed at once
+    names  names of the devices
+    least  units of work per block below which a unit costs noticeably more
+    most   units of work per block above which its values need too much memory
     """
 
     size: int
     names: list[str]
-    least_pixels: float
+    least: float
+    most: float
 
-    def focus(self, work: Work) -> Generator[FinishedBlock, None, None]:
-        """Focus the bands in blocks; yields each block when it is finished, in any order."""
+    def compute(self, work: Work) -> Generator[FinishedBlock, None, None]:
+        """Compute the bands in blocks; yields each block when it is finished, in any order."""
         ...
 
 
-def cut(tiling: Tiling, todo: list[Run], most: float, ends: set[int], unit: int = 1) -> list[Run]:
-    """The bands of `todo` in blocks of equal size, of about `most` pixels; none extends across one of `ends`.
+def cut(bands: Bands, todo: list[Run], most: float, ends: set[int], unit: int = 1) -> list[Run]:
+    """The bands of `todo` in blocks of equal size, of about `most` units of work; none extends across one of `ends`.
 
     Blocks begin at multiples of `unit` bands, except where `todo` or `ends` begin a block elsewhere.
     """
     blocks = []
     for start, stop in todo:
-        n = min(stop - start, max(1, int(np.ceil(tiling.count(start, stop) / max(most, 1)))))
+        n = min(stop - start, max(1, int(np.ceil(bands.count(start, stop) / max(most, 1)))))
         even = {(start + (stop - start) * i // n) // unit * unit for i in range(1, n)}
         first = start
         for last in sorted({e for e in even | ends if start < e < stop} | {stop}):
@@ -76,54 +79,55 @@ class LocalWorkers:
     """Engines of this process, each on its own device: see WorkerPool."""
 
     def __init__(
-        self, engines: list[Engine], budgets: list[float], names: list[str], n_rows: int, rates: list[float]
+        self, job: BlockJob, engines: Sequence[Engine], budgets: list[float], names: list[str], rates: list[float]
     ) -> None:
         """rates  speeds of the devices, relative to one another, as far as they are known before the work"""
-        self.engines, self.budgets, self.names, self.n_rows = engines, budgets, names, n_rows
+        self.job, self.engines, self.budgets, self.names = job, engines, budgets, names
         self.size, self.rates = len(engines), rates
-        self.least_pixels = max(float(engine.least_pixels) for engine in engines)
+        self.least = max(float(engine.least) for engine in engines)
+        self.most = min(float(engine.most) for engine in engines)
 
-    def focus(self, work: Work) -> Generator[FinishedBlock, None, None]:
+    def compute(self, work: Work) -> Generator[FinishedBlock, None, None]:
         """See WorkerPool."""
         each = zip(self.engines, self.budgets, strict=True)
         ends = [{last for _, last in engine.blocks(budget)} for engine, budget in each]
-        tiling = self.engines[0].tiling
+        bands = self.job.bands
         if self.size > 1:
-            least = [engine.least_pixels for engine in self.engines]
+            least = [engine.least for engine in self.engines]
             devices = [Worker(*each) for each in zip(ends, least, self.rates, strict=True)]
-            shares = Shares(tiling, work.todo, devices, most=work.most, unit=work.unit)
+            shares = Shares(bands, work.todo, devices, most=work.most, unit=work.unit)
             yield from self._together(shares, work)
             return
         before = 0
         work.on_progress(0)
-        for run in cut(tiling, work.todo, work.most, ends[0], work.unit):
+        for run in cut(bands, work.todo, work.most, ends[0], work.unit):
             block, before = self._one(0, run, work, before)
             work.on_progress(before)
             yield block
 
     def _one(self, k: int, run: Run, work: Work, before: int) -> tuple[FinishedBlock, int]:
-        """One block, focused by engine k, and the number of pairs done after it."""
-        flat, pixels = work.output_for(*run), self.engines[k].tiling.count(*run)
+        """One block, computed by engine k, and the number of contributions done after it."""
+        flat, units, passes = work.output_for(*run), self.job.bands.count(*run), self.job.passes
 
-        def rows_done(rows: float) -> None:
-            work.on_progress(before + int(min(rows, self.n_rows) * pixels))
+        def passes_done(n: float) -> None:
+            work.on_progress(before + int(min(n, passes) * units))
 
-        skipped = self.engines[k].fill(*run, flat, self.budgets[k], work.clock, rows_done)
-        return (*run, flat, skipped), before + self.n_rows * pixels
+        tally = self.engines[k].fill(*run, flat, self.budgets[k], work.clock, passes_done)
+        return (*run, flat, tally), before + passes * units
 
     def _together(self, shares: Shares, work: Work) -> Generator[FinishedBlock, None, None]:
         """One thread per device; the caller's thread reports progress and yields finished blocks."""
         finished: queue.SimpleQueue[FinishedBlock | BaseException] = queue.SimpleQueue()
         stop = threading.Event()
         alive = set(range(self.size))
-        pairs = [0] * self.size  # each thread writes its own
+        pairs = [0] * self.size  # contributions; each thread writes its own
 
         def run(k: int) -> None:
             def own_progress(done: int) -> None:
                 if stop.is_set():
                     raise _Stop
                 pairs[k] = done
-                shares.made(k, done / self.n_rows)
+                shares.made(k, done / self.job.passes)
 
             own, block = work._replace(clock=Clock(), on_progress=own_progress), None
             try:
@@ -155,8 +159,8 @@ class LocalWorkers:
         work.on_progress(0)
         threads = {k: started(k) for k in range(self.size)}
         try:
-            tiling = self.engines[0].tiling
-            running = sum(tiling.count(*run) for run in work.todo)
+            count = self.job.bands.count
+            running = sum(count(*run) for run in work.todo)
             while running:
                 try:
                     done = finished.get(timeout=0.1)
@@ -167,14 +171,27 @@ class LocalWorkers:
                     continue
                 if isinstance(done, BaseException):
                     raise done
-                running -= tiling.count(done[0], done[1])
-                work.clock.lap("backproject")
+                running -= count(done[0], done[1])
+                work.clock.lap(self.job.stage)
                 work.on_progress(sum(pairs))
                 yield done
         finally:
             stop.set()
             for thread in threads.values():
                 thread.join()
+
+
+def rates_of(infos: Sequence[DeviceInfo]) -> list[float]:
+    """Speeds of devices relative to one another, from their trials; equal where all are of one kind and driver."""
+    kinds = {(info.platform, info.name, info.kind, info.units) for info in infos}
+    return [info.rate if len(kinds) > 1 else 1.0 for info in infos]
+
+
+def speedup(infos: Sequence[DeviceInfo]) -> float:
+    """How many times as fast as the first all devices are together; drivers of the same CPU share its cores."""
+    rates = rates_of(infos)
+    cpu = [rate for info, rate in zip(infos, rates, strict=True) if info.kind == "cpu"]
+    return (sum(rates) - sum(cpu) + max(cpu, default=0.0)) / rates[0] if rates[0] > 0 else 1.0
 
 
 class _Stop(Exception):

@@ -1,7 +1,7 @@
-"""Finished tiles in files beside an unfinished image: a killed run can be continued, and several runs share one image.
+"""Finished bands in files beside an unfinished result: a killed run can be continued, and several runs share it.
 
-IMAGE.parts/ holds job.json, which describes the job, and files bands-FIRST-LAST.tiles, each with the pixels of some
-bands of the image's tiling. A file gets its name when it is complete. It holds the fingerprint of its job and a
+PATH.parts/ holds job.json, which describes the job, and files bands-FIRST-LAST.tiles, each with the values of some
+bands of the result. A file gets its name when it is complete. It holds the fingerprint of its job and a
 checksum; a file where either does not match is not used.
 """
 
@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import logging
+import math
 import os
 import re
 import secrets
@@ -20,25 +21,25 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import DTypeLike
 
-from ...base.fingerprint import as_bytes, checker, checksum, kernels, leaves
-from ...base.types import PathLike
-from ...io import output_paths
-from ..engine import ImagePlan, Skipped
-from ..focusing_task import FocusingTask
-from ..tiling.tiling import Run, Tiling
+from ..base.fingerprint import as_bytes, checker, checksum
+from ..base.types import PathLike
+from ..io import output_paths
+from .bands import Run, Tally
+from .block_job import BlockJob
 
 log = logging.getLogger(__name__)
 
-MAGIC = b"sarcl tiles 2\n"
+MAGIC = b"sarcl tiles 3\n"
 NAME = re.compile(r"bands-(\d+)-(\d+)\.tiles")
 DIGEST = 32  # bytes
 FOREIGN = "belongs to another job"  # reason why a file is left alone
+# entries of a description that a message shows; of others it says that they differ
+PLAIN = ("sarcl", "method", "tolerance", "pixels", "wrap", "skip", "polarization", "seed")
 
 
 def folder_of(path: PathLike) -> Path:
-    """The folder for the tile files of image `path`."""
+    """The folder for the tile files of the result `path`."""
     return Path(f"{output_paths.place(path)}.parts")
 
 
@@ -48,23 +49,24 @@ class TileStore:
     ValueError where the folder belongs to another job, OSError where it cannot be created.
     """
 
-    def __init__(self, folder: Path, job: dict[str, Any], tiling: Tiling, dtype: DTypeLike) -> None:
-        self.folder, self.tiling, self.dtype = folder, tiling, np.dtype(dtype)
-        self.mark = mark(job)
+    def __init__(self, folder: Path, job: BlockJob) -> None:
+        described = job.describe()
+        self.folder, self.bands, self.dtype, self.tally = folder, job.bands, np.dtype(job.dtype), job.tally
+        self.mark = mark(described)
         try:
             folder.mkdir(exist_ok=True)
         except FileExistsError:
             raise NotADirectoryError(
                 f"{str(folder)!r} is a file, and finished tiles are kept in a folder of that name; move it away"
             ) from None
-        self._sign(job)
+        self._sign(described)
 
     def runs(self) -> list[Run]:
         """Runs of bands that have a file, by the names of the files."""
         return sorted(run for path in _tiles(self.folder) if (run := self._named(path)))
 
-    def found(self, first: int, last: int) -> Iterator[tuple[Run, np.ndarray, Skipped]]:
-        """Complete files of this job with any of bands first ... last - 1, no band twice: (run, pixels, pairs skipped).
+    def found(self, first: int, last: int) -> Iterator[tuple[Run, np.ndarray, Tally]]:
+        """Complete files of this job with any of bands first ... last - 1, no band twice: (run, values, tally).
 
         A damaged file is removed, a file of another job is left alone; the log warns of both.
         """
@@ -73,19 +75,19 @@ class TileStore:
             if a < end or b <= first or a >= last:
                 continue
             path = self._path(a, b)
-            values, skipped, why = self._read(path, a, b)
-            if values is None:
+            values, tally, why = self._read(path, a, b)
+            if values is None or tally is None:
                 log.warning("%s %s: its tiles are made again", path, why)
                 if why != FOREIGN:
                     path.unlink(missing_ok=True)
                 continue
             end = b
-            yield (a, b), values, skipped
+            yield (a, b), values, tally
 
-    def save(self, first: int, last: int, parts: Iterable[np.ndarray], skipped: Skipped) -> None:
-        """Write the pixels of bands first ... last - 1, given in parts, to a file, completely or not at all."""
-        head = {"job": self.mark, "first": first, "last": last, "dtype": self.dtype.str, "skipped": asdict(skipped)}
-        text = json.dumps(head).encode()
+    def save(self, first: int, last: int, parts: Iterable[np.ndarray], tally: Tally) -> None:
+        """Write the values of bands first ... last - 1, given in parts, to a file, completely or not at all."""
+        head = {"job": self.mark, "first": first, "last": last, "dtype": self.dtype.str, "tally": asdict(tally)}  # type: ignore[call-overload]
+        text = json.dumps(head, default=_plain).encode()
         check = checker()
         temporary = self.folder / f".{secrets.token_hex(8)}.tmp"
         try:
@@ -111,7 +113,7 @@ class TileStore:
     def _named(self, path: Path) -> Run | None:
         match = NAME.fullmatch(path.name)
         first, last = (int(match[1]), int(match[2])) if match else (0, 0)
-        return (first, last) if first < last <= self.tiling.n_bands and path == self._path(first, last) else None
+        return (first, last) if first < last <= self.bands.n_bands and path == self._path(first, last) else None
 
     def _sign(self, job: dict[str, Any]) -> None:
         """Write job.json where there is none; ValueError where the job.json of the folder describes another job."""
@@ -141,29 +143,30 @@ class TileStore:
                 "arguments of that job to continue it, or resume=False (--no-resume) to delete its tiles"
             )
 
-    def _read(self, path: Path, first: int, last: int) -> tuple[np.ndarray | None, Skipped, str]:
-        """Pixels, pairs skipped and ""; or None and the reason why the file cannot be used."""
+    def _read(self, path: Path, first: int, last: int) -> tuple[np.ndarray | None, Tally | None, str]:
+        """Values, tally and ""; or None and the reason why the file cannot be used."""
         try:
             data = path.read_bytes()
         except OSError as exc:
-            return None, Skipped(), f"cannot be read ({exc.strerror})"
+            return None, None, f"cannot be read ({exc.strerror})"
         view = memoryview(data)
         start = len(MAGIC) + 8
         if len(data) < start + DIGEST or not data.startswith(MAGIC):
-            return None, Skipped(), "is truncated or damaged"
+            return None, None, "is truncated or damaged"
         if checker(view[:-DIGEST]).digest() != data[-DIGEST:]:
-            return None, Skipped(), "is truncated or damaged (its checksum differs)"
+            return None, None, "is truncated or damaged (its checksum differs)"
         start += struct.unpack("<Q", data[len(MAGIC) : start])[0]
         head = json.loads(data[len(MAGIC) + 8 : start])
         if head["job"] != self.mark:
-            return None, Skipped(), FOREIGN
-        extent = self.tiling.extent(first, last)
-        size = self.tiling.count(first, last) * self.dtype.itemsize
+            return None, None, FOREIGN
+        extent = self.bands.extent(first, last)
+        shape = extent.stop - extent.start, *self.bands.row_shape
+        size = math.prod(shape) * self.dtype.itemsize
         fits = len(data) - DIGEST - start == size and head["dtype"] == self.dtype.str
         if not fits or (head["first"], head["last"]) != (first, last):
-            return None, Skipped(), "does not hold what its name says"
+            return None, None, "does not hold what its name says"
         values = np.frombuffer(data, self.dtype, size // self.dtype.itemsize, start)
-        return values.reshape(extent.stop - extent.start, *self.tiling.row_shape), Skipped(**head["skipped"]), ""
+        return values.reshape(shape), self.tally(**head["tally"]), ""
 
 
 def discard(folder: Path) -> None:
@@ -201,42 +204,15 @@ def gaps(runs: list[Run], first: int, last: int) -> list[Run]:
     return [*missing, (first, last)] if first < last else missing
 
 
+def _plain(value: object) -> object:
+    """A number of NumPy's as JSON takes it."""
+    if isinstance(value, (np.generic, np.ndarray)):
+        return value.tolist()
+    raise TypeError(f"a {type(value).__name__} cannot be kept in a file of tiles")
+
+
 def _tiles(folder: Path) -> list[Path]:
     return [path for path in folder.glob("bands-*.tiles") if NAME.fullmatch(path.name)]
-
-
-def job_of(
-    task: FocusingTask, method: str, tolerance: float, plan: ImagePlan, tiling: Tiling, dtype: DTypeLike
-) -> dict[str, Any]:
-    """Everything that the pixels depend on, as text and numbers; arrays, and the samples, as checksums.
-
-    The device and its memory are left out: they change nothing but rounding. Reads all samples. TypeError for an option
-    that cannot be described.
-    """
-    from ...base.version import __version__
-
-    raw, grid, antennas = task.raw, task.grid, task.antennas
-    samples = checker()
-    step = max(1, 2**24 // (raw.n_samples * np.dtype(raw.samples.dtype).itemsize))
-    for start in range(0, raw.n_rows, step):
-        samples.update(as_bytes(raw.read(start, min(start + step, raw.n_rows))))
-    described = {"raw", "grid", "antennas", "sample_weight", "row_weight", "wrap", "skips"}
-    others = set(task.__dataclass_fields__) - described
-    return {
-        "sarcl": f"{__version__}, kernels {kernels()}",
-        "method": method,
-        "tolerance": tolerance,
-        "plan": ", ".join(f"{k} {v}" for k, v in plan.describe(method).items()),
-        "pixels": np.dtype(dtype).name,
-        "samples": f"{raw.n_rows} x {raw.n_samples} {np.dtype(raw.samples.dtype).name} {samples.hexdigest()[:32]}",
-        "antennas": checksum(*leaves(antennas)),
-        "weights": checksum(task.sample_weight, task.row_weight),
-        "grid": f"{' x '.join(map(str, grid.shape))} {checksum(*leaves(grid))}",
-        "bands": tiling.n_bands,
-        "wrap": task.wrap,
-        "skip": ", ".join(sorted(task.skips)),
-        "options": checksum(*(value for name in sorted(others) for value in (name, *leaves(getattr(task, name))))),
-    }
 
 
 def mark(job: dict[str, Any]) -> str:
@@ -249,6 +225,6 @@ def difference(stored: dict[str, Any], job: dict[str, Any]) -> str:
     differences = []
     for name, value in job.items():
         if stored.get(name) != value:
-            plain = name in ("sarcl", "method", "tolerance", "pixels", "wrap", "skip")
+            plain = name in PLAIN
             differences.append(f"{name} was {stored.get(name)}, is {value}" if plain else f"other {name}")
     return "; ".join(differences) or "other options"

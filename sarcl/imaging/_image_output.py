@@ -9,13 +9,14 @@ from typing import Any, TypeGuard
 import numpy as np
 from numpy.typing import DTypeLike
 
-from ...base.text import size_text
-from ...base.types import PathLike, WritableArray
-from ...io import formats
-from ...model import store
-from ...model.image import Image
-from ...model.image_grid import ImageGrid
-from ..tiling.tiling import FlatImage, Tiling
+from ..base.text import size_text
+from ..base.types import PathLike, WritableArray
+from ..blocks.bands import FlatArray
+from ..io import formats
+from ..model import store
+from ..model.image import Image
+from ..model.image_grid import ImageGrid
+from .tiling.tiling import Tiling
 
 
 class ImageOutput:
@@ -59,7 +60,7 @@ class ImageOutput:
             self.data = array
         # engines write rows of a plane to the image itself; listed points are copied at the end
         self._points = None if tiling.in_rows else np.empty(grid.size, dtype)
-        self.flat: FlatImage = self.data if self._points is None else self._points
+        self.flat: FlatArray = self.data if self._points is None else self._points
 
     def finish(self) -> None:
         """Complete `data`: all pixels have been written to `flat`."""
@@ -75,23 +76,6 @@ class ImageOutput:
                 self.writer.mark(job)
             return store.finish_image(self.writer, self.grid, **fields)
         return Image(self.data, self.grid, **fields)
-
-
-class BandBuffer:
-    """Buffer for the pixels of some bands, indexed like ImageOutput.flat, where there is no memory for the whole
-    image."""
-
-    def __init__(self, tiling: Tiling, first: int, last: int, dtype: DTypeLike) -> None:
-        extent = tiling.extent(first, last)
-        self.start = extent.start
-        self.values = np.empty((extent.stop - extent.start, *tiling.row_shape), dtype)
-
-    def __getitem__(self, rows: slice) -> np.ndarray:
-        return self.values[rows.start - self.start : rows.stop - self.start]
-
-    def __setitem__(self, at: slice | tuple[slice, slice], block: np.ndarray) -> None:
-        rows, *rest = at if isinstance(at, tuple) else (at,)
-        self.values[(slice(rows.start - self.start, rows.stop - self.start), *rest)] = block
 
 
 def is_path(out: object) -> TypeGuard[PathLike]:

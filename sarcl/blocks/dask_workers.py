@@ -1,8 +1,8 @@
 """Workers of a dask.distributed cluster, each with a device of its own. Needs sarcl[dask].
 
-Dask schedules the blocks. A worker receives the task once, opens its device in its own process with the first block,
-and returns the pixels of every block. Samples in a file are read from the file by each worker, so all workers must
-find the file under the same name.
+Dask schedules the blocks. A worker receives the recipe of the engine once, opens its device in its own process with the
+first block, and returns the values of every block. Samples in a file are read from the file by each
+worker, so all workers must find the file under the same name.
 """
 
 from __future__ import annotations
@@ -12,91 +12,86 @@ import secrets
 import threading
 from collections.abc import Generator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from ...base.stage_timer import Clock
-from ...base.types import LazyRows
-from ...io import sarcl_hdf5
-from ...model.lazy_rows import Picked, Stacked
-from ...numerics.cost_model import DeviceClass
-from ...opencl import memory_budget
-from ...opencl.choose_device import open_device, split_choice
-from ...opencl.device import Device, DeviceChoice
-from ...opencl.device_list import DeviceInfo
-from ...opencl.failures import DeviceFailed
-from ..choose_method import MethodChoice
-from ..engine import Engine, Skipped
-from ..focusing_task import FocusingTask
-from ..tiling.tiling import Run
-from .image_output import BandBuffer
+from ..base.stage_timer import Clock
+from ..base.types import LazyRows
+from ..io import sarcl_hdf5
+from ..model.lazy_rows import Picked, Stacked
+from ..numerics.cost_model import DeviceClass
+from ..opencl.choose_device import open_device, split_choice
+from ..opencl.device import Device, DeviceChoice
+from ..opencl.device_list import DeviceInfo
+from ..opencl.failures import DeviceFailed
+from .bands import BandBuffer, Bands, Engine, Recipe, Run, Tally
+from .block_job import BlockJob
 from .workers import FinishedBlock, Work, cut
 
 if TYPE_CHECKING:
     from distributed import Client
 
-Devices: TypeAlias = DeviceChoice | Sequence[DeviceChoice] | None  # as `backproject` takes `device`
+Devices: TypeAlias = DeviceChoice | Sequence[DeviceChoice] | None  # as verbs that compute in blocks take `device`
 BLOCKS_EACH = 4  # blocks per worker, so that no worker waits long for the slowest
 
 
 @dataclass(frozen=True, eq=False)
 class WorkerTask:
-    """Data that every worker receives once: the task, the plan, the choice of its device, and the memory it may use
-    there."""
+    """Data that every worker receives once: how it makes its engine, the bands, and the choice of its device."""
 
-    task: FocusingTask
-    chosen: MethodChoice
+    recipe: Recipe
+    bands: Bands
+    dtype: Any
+    tally: type[Tally]
     device: Devices
-    max_bytes: float | None
     name: str
 
 
 class DaskWorkers:
     """The workers of a distributed.Client; see workers.WorkerPool."""
 
-    least_pixels = 0.0
+    least = 0.0
 
-    def __init__(
-        self, client: Client, task: FocusingTask, chosen: MethodChoice, device: Devices, max_bytes: float | None
-    ) -> None:
-        self.client, self.tiling, self.n_rows = client, chosen.tiling, task.raw.n_rows
+    def __init__(self, client: Client, job: BlockJob, recipe: Recipe, device: Devices, most: float) -> None:
+        """most  units of work of a block, whose values return to the caller's memory"""
+        self.client, self.job, self.most = client, job, most
         self.places = _places(client)
         self.size = len(self.places)
         self.names: list[str] = []
-        raw = replace(task.raw, samples=portable(task.raw.samples))
-        self.worker_task = WorkerTask(replace(task, raw=raw), chosen, device, max_bytes, secrets.token_hex(8))
+        self.worker_task = WorkerTask(recipe, job.bands, job.dtype, job.tally, device, secrets.token_hex(8))
 
-    def focus(self, work: Work) -> Generator[FinishedBlock, None, None]:
+    def compute(self, work: Work) -> Generator[FinishedBlock, None, None]:
         """See WorkerPool; progress is reported block by block."""
         from distributed import as_completed
 
         lost = _losses()
-        most, pixels = work.most, sum(self.tiling.count(*run) for run in work.todo)
+        bands, most = self.job.bands, min(work.most, self.most)
         if self.size > 1:
-            most = min(most, pixels / (BLOCKS_EACH * self.size))
-        blocks = cut(self.tiling, work.todo, most, set(), work.unit)
+            most = min(most, sum(bands.count(*run) for run in work.todo) / (BLOCKS_EACH * self.size))
+        blocks = cut(bands, work.todo, most, set(), work.unit)
         work.on_progress(0)
         if not blocks:
             return
         futures: list[Any] = []
-        pairs = done = 0
+        contributions = done = 0
         try:
             worker_task = self.client.scatter(self.worker_task, broadcast=True, hash=False)
             futures = self.client.map(_make, blocks, worker_task=worker_task, places=self.places, pure=False)
             run_of = dict(zip((f.key for f in futures), blocks, strict=True))
             for future in as_completed(futures):
                 first, last = run_of[future.key]
-                values, skipped, name = future.result()
+                values, tally, name = future.result()
                 future.release()
                 self.names = sorted({*self.names, name})
                 flat = work.output_for(first, last)
-                flat[self.tiling.extent(first, last)] = values
-                work.clock.lap("backproject")
-                pairs, done = pairs + self.n_rows * self.tiling.count(first, last), done + 1
-                work.on_progress(pairs)
-                yield first, last, flat, skipped
+                flat[bands.extent(first, last)] = values
+                work.clock.lap(self.job.stage)
+                contributions += self.job.passes * bands.count(first, last)
+                done += 1
+                work.on_progress(contributions)
+                yield first, last, flat, tally
         except lost as exc:
             raise DeviceFailed(
                 f"the workers of the cluster were lost, with {done} of {len(blocks)} blocks finished "
@@ -195,19 +190,20 @@ def _info(choice: Devices, place: int) -> DeviceInfo:
         return _open(choice, place).info
 
 
-def _make(run: Run, *, worker_task: WorkerTask, places: dict[str, int]) -> tuple[np.ndarray, Skipped, str]:
-    """In a worker: pixels of a run of bands, pairs skipped, and the device's name."""
+def _make(run: Run, *, worker_task: WorkerTask, places: dict[str, int]) -> tuple[np.ndarray, Tally, str]:
+    """In a worker: values of a run of bands, their tally, and the device's name."""
     global _engine
     from distributed import get_worker
 
     with _lock:
         if _engine is None or _engine[0] != worker_task.name:
             device = _open(worker_task.device, places.get(get_worker().address, 0))
-            _engine = worker_task.name, worker_task.chosen.on(device, worker_task.task), device
+            _engine = None  # frees what an earlier result holds on the device
+            _engine = worker_task.name, worker_task.recipe.on(device), device
         _, engine, device = _engine
-        budget = min(memory_budget.budget(device, worker_task.max_bytes), device.info.memory)
-        pixels, skipped = BandBuffer(worker_task.chosen.tiling, *run, worker_task.chosen.dtype), Skipped()
+        budget = worker_task.recipe.budget(device)
+        values, tally = BandBuffer(worker_task.bands, *run, worker_task.dtype), worker_task.tally()
         ends = {last for _, last in engine.blocks(budget)}
-        for first, last in cut(worker_task.chosen.tiling, [run], float("inf"), ends):
-            skipped += engine.fill(first, last, pixels, budget, Clock(), lambda _: None)
-        return pixels.values, skipped, device.info.name
+        for first, last in cut(worker_task.bands, [run], float("inf"), ends):
+            tally = tally + engine.fill(first, last, values, budget, Clock(), lambda _: None)
+        return values.values, tally, device.info.name

@@ -1,0 +1,76 @@
+"""Options of the verbs whose results are computed in blocks: their records contain these."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..base.options import option, or_none
+from ..base.validation import count, instance
+from ..numerics.run_options import RunOptions
+from ..opencl.device import DeviceChoice
+
+if TYPE_CHECKING:
+    import distributed
+
+Tile = Sequence[int] | np.ndarray  # (i, n): piece i of n
+
+
+def _resume(name: str, value: object) -> object:
+    instance(name, value, bool)
+    return value
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class BlockOptions(RunOptions):
+    """Options of every verb whose result is computed in blocks."""
+
+    resume: bool | None = option(
+        None,
+        'whether finished tiles of a result at a path are kept in "PATH.parts", where the same call finds them if the '
+        "run is killed. None: they are kept from the first second on; True: also when the run ends in an exception; "
+        "False: they are not kept, and those of earlier runs are deleted",
+        or_none(_resume),
+        in_files=False,
+    )
+    tile: Tile | None = option(
+        None,
+        '(i, n): compute only piece i of n, 1 <= i <= n, and keep its tiles in "PATH.parts"; the run that completes '
+        "the result assembles and returns it, the others return None",
+        in_files=False,
+    )
+    device: DeviceChoice | Sequence[DeviceChoice] | None = option(  # type: ignore[assignment]  # wider than others'
+        None, 'see `sarcl.devices`; a list of devices, or "all", for several at once', in_files=False
+    )
+    cluster: distributed.Client | None = option(
+        None, "a dask.distributed.Client whose workers compute the tiles, each on a device of its own", in_files=False
+    )
+
+    def piece(self, has_path: bool, example: str) -> tuple[int, int] | None:
+        """`tile` as (i, n), 0 <= i <= n, or None; ValueError for options that do not go together.
+
+        has_path  whether the result has a path;  example  of one, for messages
+        """
+        tile, resume = self.tile, self.resume
+        if (tile is not None or resume) and not has_path:
+            name, value = ("tile", tile) if tile is not None else ("resume", resume)
+            raise ValueError(
+                f'{name} is {" ".join(repr(value).split()):.60} but out is no path; give out="{example}": tiles are '
+                "kept beside it"
+            )
+        if tile is None:
+            return None
+        if resume is False:
+            raise ValueError(
+                "tile and resume=False do not go together: a piece would delete the tiles of the other pieces"
+            )
+        parts: Any = tile
+        if not isinstance(parts, (tuple, list)) or len(parts) != 2:
+            raise ValueError(f"tile is {' '.join(repr(tile).split()):.60}; wanted (i, n): piece i of n")
+        i, n = count("tile[0]", parts[0], least=0), count("tile[1]", parts[1])
+        if i > n:
+            raise ValueError(f"tile is {tile!r}; pieces of {n} are numbered 1 to {n}")
+        return i, n
