@@ -22,8 +22,8 @@ from ._exact_facets import ExactFacets
 from ._facet_spreading import FacetSpreader, TiledFacets
 from ._unseen_scene import OUTSIDE_BEAM, OUTSIDE_WINDOW
 from .echo_request import EchoRequest
+from .factorized.spreader import FactorizedSpreader
 from .points.direct import PointSpreader
-from .points.factorized import FactorizedSpreader
 from .points.point_plan import PointPlan, PreparedPoints
 from .scene_plan import NODES
 from .spreading import Band, ChannelView, Counts
@@ -141,15 +141,17 @@ class SceneEchoes:
         view = ChannelView(
             antennas, weights, frequencies, waveform.bandwidth, request.polarizations, request.vertical, request.gated
         )
-        points: tuple[PointSpreader | FactorizedSpreader, ...] = ()
+        points: PointSpreader | None = None
         parts: list[tuple[ErrorTerm, dict[str, Any]]] = []
-        spreaders: list[FacetSpreader | ExactFacets] = []
+        spreaders: list[FacetSpreader | ExactFacets | FactorizedSpreader] = []
         stop = first + len(antennas)
         if self.points is not None and self.prepared_points is not None and request.same:
             nodes = chebyshev(waveform.center, waveform.bandwidth, self.n_nodes)
             plan, error = self._plan_points(self.prepared_points, antennas, view.band)
             tolerance = self.error_budget - error
-            points = tuple(plan.spreaders(request.device, self.points, view, nodes, tolerance, request.budget))
+            points = plan.direct_spreader(view, nodes, tolerance, request.budget)
+            by_levels = plan.factorized_spreader(request.device, self.points, view, request.same, request.budget)
+            spreaders += [] if by_levels is None else [by_levels]
             parts.append((ErrorTerm("points", plan.predicted_error + error, SMALLER_TOLERANCE), plan.describe()))
         if self.facets is not None and self.subdivision is not None and self.subdivision.plan.is_float64:
             facets = self.facets if stop - first == self.n_pulses else self.facets.between(first, stop)
@@ -200,13 +202,13 @@ class SceneEchoes:
 class ChannelEchoes:
     """The echoes of a scene in one channel at one receiver, as they are planned.
 
-    points, spreaders  spreaders of points and of facets
+    points, spreaders  what adds points at each pulse, None where there are none; and what adds other scatterers
     error_terms      relative, of the channel;  plan  in words, of its part with the largest error
     """
 
     scene: SceneEchoes
-    points: tuple[PointSpreader | FactorizedSpreader, ...]
-    spreaders: tuple[FacetSpreader | ExactFacets, ...]
+    points: PointSpreader | None
+    spreaders: tuple[FacetSpreader | ExactFacets | FactorizedSpreader, ...]
     error_terms: tuple[ErrorTerm, ...]
     plan: dict[str, Any]
 
@@ -217,8 +219,9 @@ class ChannelEchoes:
 
     def apart(self) -> tuple[ChannelEchoes, list[FactorizedSpreader]]:
         """The echoes that are added pulse by pulse, and what adds the others, by levels for the whole track."""
-        by_levels = [spreader for spreader in self.points if isinstance(spreader, FactorizedSpreader)]
-        return replace(self, points=tuple(one for one in self.points if isinstance(one, PointSpreader))), by_levels
+        by_levels = [spreader for spreader in self.spreaders if isinstance(spreader, FactorizedSpreader)]
+        rest = tuple(one for one in self.spreaders if not isinstance(one, FactorizedSpreader))
+        return replace(self, spreaders=rest), by_levels
 
     def add(self, samples: np.ndarray, pulses: Sequence[int], done: int, total: int) -> Counts:
         """Add sum_k a_k exp(-j 2 pi f (tau_k - tau_ref)) to samples (n, n_polarizations, n_samples), zeros so far.
@@ -231,11 +234,10 @@ class ChannelEchoes:
             request.report("echo", done + counts.pairs + n, total)
 
         on_progress(0)
-        if self.points:
-            for points in self.points:
-                counts += points.add(samples[:, request.same[0]], pulses, request.clock, on_progress)
+        if self.points is not None:
+            counts += self.points.add(samples[:, request.same[0]], pulses, request.clock, on_progress)
             samples[:, request.same[1:]] = samples[:, request.same[:1]]
-        elif scene.points is not None:  # in these polarisations points send nothing back
+        elif scene.points is not None and not request.same:  # in these polarisations points send nothing back
             counts = Counts(len(scene.points) * len(samples))
         for spreader in self.spreaders:
             counts += spreader.add(samples, pulses, request.clock, on_progress)

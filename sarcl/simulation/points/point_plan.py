@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...base.boxes import box
 from ...base.errors import NotApplicable
 from ...model.waveform import Waveform
 from ...numerics import cost_model
@@ -18,14 +17,14 @@ from ...numerics.pulse_geometry import PulseGeometry
 from ...opencl.device import Device
 from ...scattering.antenna_weights import AntennaWeights
 from ...scattering.scatterers import Points
+from ..factorized.cells import ScattererCells, scatterers_in_window
+from ..factorized.levels import FactorizedPlan, plan_levels
+from ..factorized.scatterers import Channel, Scatterers
+from ..factorized.spreader import FactorizedSpreader
 from ..kernel_images import PatchSamples, sample_patches
 from ..spreading import Band, ChannelView, TiledScatterers
-from ._levels import FactorizedPlan, plan_levels
-from ._point_cells import PointCells
 from .direct import PointSpreader, tiled_points
-from .factorized import FactorizedSpreader
 
-WINDOW_DEPTHS = (0, 3, 6)  # depths of cells that are looked for in the range window, coarse ones first
 FEWEST_PULSES = 8  # fewer are not decimated
 
 
@@ -38,7 +37,7 @@ class PointPlan:
     """
 
     direct: tuple[TiledScatterers, Plan] | None
-    factorized: tuple[PointCells, np.ndarray, FactorizedPlan] | None = None
+    factorized: tuple[ScattererCells, np.ndarray, FactorizedPlan] | None = None
 
     @property
     def plans(self) -> list[Plan | FactorizedPlan]:
@@ -55,16 +54,22 @@ class PointPlan:
         """The plan of most points, in words and numbers."""
         return self.plans[0].describe("spread")
 
-    def spreaders(
-        self, device: Device, points: Points, view: ChannelView, nodes: np.ndarray, tolerance: float, budget: float
-    ) -> Iterator[PointSpreader | FactorizedSpreader]:
-        """What adds the points; nodes, tolerance, budget  as PointSpreader takes them."""
-        if self.factorized is not None:
-            cells, numbers, plan = self.factorized
-            amplitudes, n_samples = points.amplitudes[numbers], len(view.frequencies)
-            yield FactorizedSpreader(device, plan, cells, amplitudes, view.antennas, n_samples, budget)
-        if self.direct is not None:
-            yield PointSpreader(*self.direct, view, nodes, tolerance, budget)
+    def direct_spreader(
+        self, view: ChannelView, nodes: np.ndarray, tolerance: float, budget: float
+    ) -> PointSpreader | None:
+        """What adds points at each pulse; arguments as PointSpreader takes them."""
+        return None if self.direct is None else PointSpreader(*self.direct, view, nodes, tolerance, budget)
+
+    def factorized_spreader(
+        self, device: Device, points: Points, view: ChannelView, columns: Sequence[int], budget: float
+    ) -> FactorizedSpreader | None:
+        """What adds points by levels; columns  of the polarisations in which they reflect."""
+        if self.factorized is None:
+            return None
+        cells, numbers, plan = self.factorized
+        amplitudes = points.amplitudes[numbers]
+        scatterers = Scatterers(cells, np.stack([amplitudes.real, amplitudes.imag]), (Channel(tuple(columns)),))
+        return FactorizedSpreader(device, plan, scatterers, view.antennas, len(view.frequencies), budget)
 
 
 @dataclass(eq=False)
@@ -116,13 +121,13 @@ class PreparedPoints:
             return "planning would take longer than it saves"
         if not forced and not self.device.is_cpu and len(antennas) < cost_model.PULSES_BESIDE_CELLS:
             return "the GPU adds these pulses before the host has made cells"
-        seen = points_in_window(self._cells, antennas)
+        seen = scatterers_in_window(self._cells, antennas)
         numbers, cells = self._cells.order, self._cells
         if not seen.all():
             numbers = numbers[seen]
             if len(numbers) * len(antennas) < (1 if forced else cost_model.SEARCH_PAYS):
                 return "too few points lie inside the range window at every pulse"
-            cells = PointCells(self.points.positions[numbers])
+            cells = ScattererCells(self.points.positions[numbers])
             numbers = numbers[cells.order]
         plan = plan_levels(cells, antennas, band, tolerance, lambda leaf: self._image_error(leaf, band))
         if isinstance(plan, str):
@@ -135,8 +140,8 @@ class PreparedPoints:
         return PointPlan((rest, rest.plan(antennas, band, tolerance)), (cells, numbers, plan))
 
     @functools.cached_property
-    def _cells(self) -> PointCells:
-        return PointCells(self.points.positions)
+    def _cells(self) -> ScattererCells:
+        return ScattererCells(self.points.positions)
 
     @functools.cached_property
     def _whole(self) -> TiledScatterers:
@@ -164,24 +169,3 @@ def _direct_cost(band: Band, tolerance: float, n_points: int) -> float:
     """About the cost of a pair that is added directly, in contributions."""
     steps = carrier_steps(band.carrier, band.n_samples, band.bandwidth)
     return choose_interpolator(tolerance, band.n_samples, n_points, steps)[2]
-
-
-def points_in_window(cells: PointCells, antennas: PulseGeometry) -> np.ndarray:
-    """Whether points, in the order of the cells, lie in the range window of every pulse, judged by cells: bool (n,)."""
-    inside = np.zeros(len(cells), bool)
-    undecided = np.zeros(1, int)  # first points of cells of the depth before that may be inside or not
-    for depth, before in zip(WINDOW_DEPTHS, (0, *WINDOW_DEPTHS), strict=False):
-        first, larger = cells.first(depth), cells.first(before)
-        parents = larger[np.searchsorted(larger, first[:-1], side="right") - 1]
-        candidates = np.flatnonzero(np.isin(parents, undecided))
-        crossing = []
-        for begin, end in zip(first[candidates].tolist(), first[candidates + 1].tolist(), strict=True):
-            low, high = box(cells.positions[begin:end])
-            margin = antennas.depth((low + high) / 2 + cells.center)
-            radius = float(np.linalg.norm(high - low)) / 2 * (1 + 1e-9)
-            if margin.min() >= radius:
-                inside[begin:end] = True
-            elif margin.max() >= -radius:
-                crossing.append(begin)
-        undecided = np.array(crossing, int)
-    return inside

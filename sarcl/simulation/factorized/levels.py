@@ -18,7 +18,7 @@ from ...numerics.pulse_geometry import PulseGeometry
 from ...numerics.subapertures import Decimation, decimated, filter_error, rates, smooth_runs
 from ...opencl import fft
 from ..spreading import Band
-from ._point_cells import CellLevel, PointCells
+from .cells import CellLevel, ScattererCells
 
 SPACINGS = (1.5, 2.0, 2.5, 3.0, 4.0)  # profile samples per 1/bandwidth
 TAPS = (4, 6, 8)  # taps of the interpolators along range and along the track
@@ -98,7 +98,7 @@ class Candidate(NamedTuple):
 
 
 def plan_levels(
-    cells: PointCells, antennas: PulseGeometry, band: Band, tolerance: float, image_error: Callable[[Plan], float]
+    cells: ScattererCells, antennas: PulseGeometry, band: Band, tolerance: float, image_error: Callable[[Plan], float]
 ) -> FactorizedPlan | str:
     """The cheapest plan whose predicted error is at most `tolerance`, or the reason why there is none.
 
@@ -120,7 +120,7 @@ class _Case:
 
     def __init__(
         self,
-        cells: PointCells,
+        cells: ScattererCells,
         antennas: PulseGeometry,
         band: Band,
         tolerance: float,
