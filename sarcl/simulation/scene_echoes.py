@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.errors import NothingSeen, ToleranceUnreachable
+from ..base.errors import NotApplicable, NothingSeen, ToleranceUnreachable
 from ..base.report import SMALLER_TOLERANCE, ErrorTerm, root_sum_square
 from ..model.waveform import Waveform
 from ..numerics.polynomials import chebyshev
@@ -19,6 +19,7 @@ from ..scattering.facets import FacetSet
 from ..scattering.scatterers import Points
 from ..scattering.subdivision import Subdivision
 from ._exact_facets import ExactFacets
+from ._facet_method import facet_echoes
 from ._facet_spreading import FacetSpreader, TiledFacets
 from ._unseen_scene import OUTSIDE_BEAM, OUTSIDE_WINDOW
 from .echo_request import EchoRequest
@@ -110,7 +111,7 @@ class SceneEchoes:
         with self._unreachable_for_the_caller():
             for band in bands:
                 if self.prepared_points is not None:
-                    self._plan_points(self.prepared_points, antennas, band)
+                    self._plan_points(self.prepared_points, self.weights.at(antennas), band)
                 for tiled in self.tiled_facets:
                     left = self.error_budget / self.gain - tiled.facet_plan.predicted_error
                     tiled.plan(antennas, band, left, least_tolerance=0.0)
@@ -123,10 +124,10 @@ class SceneEchoes:
         except ToleranceUnreachable as refused:
             raise refused.restated(self.request.tolerance, None, "take a larger tolerance") from None
 
-    def _plan_points(self, points: PreparedPoints, antennas: PulseGeometry, band: Band) -> tuple[PointPlan, float]:
+    def _plan_points(self, points: PreparedPoints, weights: AntennaWeights, band: Band) -> tuple[PointPlan, float]:
         """The plan of points, and the error of their weights over the band."""
         error = self.weight_error.of(self.n_nodes, self.error_budget)
-        return points.plan(antennas, band, self.error_budget - error), error
+        return points.plan(weights, band, self.error_budget - error, self.n_nodes), error
 
     @property
     def n_nodes(self) -> int:
@@ -144,14 +145,14 @@ class SceneEchoes:
         points: PointSpreader | None = None
         parts: list[tuple[ErrorTerm, dict[str, Any]]] = []
         spreaders: list[FacetSpreader | ExactFacets | FactorizedSpreader] = []
-        stop = first + len(antennas)
+        stop, reason = first + len(antennas), ""
         if self.points is not None and self.prepared_points is not None and request.same:
             nodes = chebyshev(waveform.center, waveform.bandwidth, self.n_nodes)
-            plan, error = self._plan_points(self.prepared_points, antennas, view.band)
+            plan, error = self._plan_points(self.prepared_points, weights, view.band)
             tolerance = self.error_budget - error
             points = plan.direct_spreader(view, nodes, tolerance, request.budget)
-            by_levels = plan.factorized_spreader(request.device, self.points, view, request.same, request.budget)
-            spreaders += [] if by_levels is None else [by_levels]
+            leveled = plan.factorized_spreader(request.device, self.points, view, nodes, request.same, request.budget)
+            spreaders += [] if leveled is None else [leveled]
             parts.append((ErrorTerm("points", plan.predicted_error + error, SMALLER_TOLERANCE), plan.describe()))
         if self.facets is not None and self.subdivision is not None and self.subdivision.plan.is_float64:
             facets = self.facets if stop - first == self.n_pulses else self.facets.between(first, stop)
@@ -162,11 +163,15 @@ class SceneEchoes:
         spread = []
         for tiled in self.tiled_facets:
             facets = tiled.facets if stop - first == self.n_pulses else tiled.facets.between(first, stop)
-            spreader = FacetSpreader(tiled, facets, view, self.error_budget / self.gain, request.budget)
-            words = spreader.plan.describe("spread") | tiled.facet_plan.describe()
-            words |= {"pulses per amplitude": spreader.pulse_nodes.spacing} | self.mesh_warnings | self.shadow_words
-            spread.append((self.gain * spreader.predicted_error, words))
-            spreaders.append(spreader)
+            share = self.error_budget / self.gain
+            echoes = facet_echoes(tiled, facets, view, share, request.budget, method=request.method)
+            spread.append((self.gain * echoes.error, echoes.words | self.mesh_warnings | self.shadow_words))
+            spreaders += echoes.spreaders
+            reason = reason or echoes.reason
+        by_levels = any(isinstance(one, FactorizedSpreader) for one in spreaders)
+        if request.method == "factorized" and not by_levels:
+            text = reason or "few facets in few samples are added up in float64"
+            raise NotApplicable(f'method="factorized" is not possible: {text}; pass method="auto"')
         if spread:  # relative to the norm of the facets that each adds: not more of all of them
             parts.append((ErrorTerm("facets", max(error for error, _ in spread), SMALLER_TOLERANCE), spread[0][1]))
         chosen = max(parts, key=lambda part: part[0].value)[1] if parts else {}

@@ -14,9 +14,10 @@ from sarcl.numerics.device_profiles import SpreadSamples
 from sarcl.numerics.pulse_geometry import PulseGeometry
 from sarcl.reference.equations import point_echo as exact_echo
 from sarcl.reference.merge import expand, merge
+from sarcl.scattering.antenna_weights import AntennaWeights
 from sarcl.simulation.factorized._ascent import Ascent
 from sarcl.simulation.factorized.cells import ScattererCells, scatterers_in_window
-from sarcl.simulation.factorized.levels import plan_levels
+from sarcl.simulation.factorized.levels import Amplitudes, plan_levels
 from sarcl.simulation.factorized.scatterers import Channel, Scatterers
 from sarcl.simulation.spreading import Band
 
@@ -191,9 +192,13 @@ def test_profiles_are_moved_and_interpolated_between_pulses_as_by_the_twin(devic
         n_samples=raw.n_samples, near=-1e3, far=1e3,
     )  # fmt: skip
     cells = ScattererCells(scene.positions)
-    plan = plan_levels(cells, antennas, Band(raw.n_samples, 300e6, 9.6e9), 1e-3, lambda leaf: leaf.interpolator.error)
+    plan = plan_levels(
+        cells, antennas, Band(raw.n_samples, 300e6, 9.6e9), 1e-3, Amplitudes(lambda leaf: leaf.interpolator.error)
+    )
     amplitudes = scene.amplitudes[cells.order]
-    scatterers = Scatterers(cells, np.stack([amplitudes.real, amplitudes.imag]), (Channel((0,)),))
+    scatterers = Scatterers(
+        cells, np.stack([amplitudes.real, amplitudes.imag]), (Channel((0,)),), AntennaWeights(antennas, 9.6e9)
+    )
     ascent, root = Ascent(device, plan, scatterers, antennas, raw.n_samples, 2e9), plan.levels[0]
     shape = len(root.cells), len(root.decimation.kept), root.stride
     random = np.random.default_rng(1)
@@ -288,10 +293,6 @@ def test_what_cannot_be_factorised_is_refused_with_the_reason_and_added_directly
             raw = factorized_echo(cloud(), positions, 1e-3, device=device, method="auto")
             assert raw.report.plan["method"] == "spread"
         assert error_of(raw, cloud()) <= 1e-3
-    with pytest.raises(NotApplicable, match="echoes of facets alone"):
-        factorized_echo(sarcl.Scene.from_heights([-1, 1], [-1, 1], np.zeros((2, 2))), line())
-    with pytest.raises(NotApplicable, match="antenna gains"):
-        factorized_echo(cloud(), line(), radar=sarcl.Radar(power=1.0))
     with pytest.raises(ValueError, match="method"):
         factorized_echo(cloud(), line(), method="quick")
 

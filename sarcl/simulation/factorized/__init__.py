@@ -2,12 +2,13 @@
 
 For other folders:
 
-    cells     scatterers in cubic cells, level by level, and those that the range windows of all pulses hold
-    levels    levels of cells, decimation and interpolation for a tolerance
-    spreader  adds scatterers to samples by a plan of levels
+    cells       scatterers in cubic cells, level by level, and those that the range windows of all pulses hold
+    levels      levels of cells, decimation and interpolation for a tolerance
+    scatterers  what the kernel of the smallest cells reads of scatterers, and the sums that they make
+    spreader    adds scatterers to samples by a plan of levels
 
 For this folder alone:
 
-    _ascent   from profiles of the smallest cells to those of pulses
-    _leaves   scatterers spread into profiles of the smallest cells
+    _ascent     from profiles of the smallest cells to those of pulses
+    _leaves     scatterers spread into profiles of the smallest cells
 """

@@ -80,6 +80,7 @@ class _Join:
 class Ascent:
     """From profiles of the smallest cells to those of larger and larger ones, with what all share on the device.
 
+    fronts  number of facets spread so far that each position kept for the smallest cells sees from their front
     cells_at_once, pulses_at_once  largest cells whose profiles are on the device together, and pulses they are added to
     """
 
@@ -94,10 +95,12 @@ class Ascent:
     ) -> None:
         """budget  bytes on the device"""
         self.device, self.plan, self.antennas, levels = device, plan, antennas, plan.levels
+        self.n_scatterers = len(scatterers)
         self.center, length = scatterers.cells.center, plan.leaf.length
         self.bistatic, self.lanes = not antennas.is_monostatic, device.info.vector_width
         self.leaves = Leaves(device, plan, scatterers, bistatic=self.bistatic)
         kept = [level.decimation.kept for level in levels]
+        self.fronts = np.zeros(len(kept[-1]), np.int64)
         self.pulses = [Pulses.of(device, k, self.center, length, range(len(k))) for k in kept[:-1]]
         self.centers = [device.upload(float_pairs.wide(level.cells.centers.T)) for level in levels]
         self.filters = [device.upload(level.decimation.filter) for level in levels]
@@ -110,7 +113,9 @@ class Ascent:
         per_pulse, room = 24 * self.stride + self.spectra_of.row_bytes, budget / 4
         n_roots, n_pulses = len(levels[0].cells), len(antennas)
         self.pulses_at_once = int(np.clip(room / per_pulse, 1, min(max(most_pulses(device), 256), n_pulses)))
-        self.cells_at_once = int(np.clip(room / self._bytes(0, self.pulses_at_once), 1, n_roots))
+        self.cells_at_once = int(
+            np.clip(room / len(scatterers.channels) / self._bytes(0, self.pulses_at_once), 1, n_roots)
+        )
         self.within = room / max(len(levels) - 1, 1)  # bytes of the profiles of each deeper level
 
     def _bytes(self, level: int, n_pulses: int) -> float:
@@ -121,11 +126,13 @@ class Ascent:
             own = self.leaves.nbytes
         return float(own + 4 * (4 + self.plan.between.taps) * n_pulses)
 
-    def profiles(self, level: int, low: int, high: int) -> Buffer:
+    def profiles(self, channel: int, level: int, low: int, high: int) -> Buffer:
         """Profiles of cells low ... high - 1 of a level: a buffer (high - low, kept pulses, stride, 2)."""
         levels = self.plan.levels
         if level == len(levels) - 1:
-            return self.leaves.profiles(low, high)
+            profiles, fronts = self.leaves.profiles(channel, low, high)
+            self.fronts += fronts if channel == 0 else 0
+            return profiles
         pulses, below, stride = self.pulses[level], level + 1, levels[level].stride
         join = self.joins[below]
         out = self.device.zeros(8 * (high - low) * pulses.n_used * stride)
@@ -134,8 +141,18 @@ class Ascent:
         step = max(1, int(self.within / self._bytes(below, pulses.n_used)))
         for first in range(begin, end, step):
             last = min(first + step, end)
-            self._expand(below, self.profiles(below, first, last), (first, last), target)
+            self._expand(below, self.profiles(channel, below, first, last), (first, last), target)
         return out
+
+    def facing_away(self, first: int, stop: int) -> int:
+        """Pairs of facets and pulses first ... stop - 1 seen from behind, by the kept position next to each pulse."""
+        near = np.arange(first, stop)
+        for level in self.plan.levels:
+            decimation = level.decimation
+            before, row = decimation.neighbours[near].T
+            taps = decimation.filter.shape[1]
+            near = before + taps // 2 - 1 + (2 * row >= decimation.ratio)
+        return int((self.n_scatterers - self.fronts[near]).sum())
 
     def rows(self, profiles: Buffer, roots: tuple[int, int], pulses: range) -> Buffer:
         """Profiles of pulses about their reference range, of the largest cells (first, stop): a buffer as

@@ -19,11 +19,15 @@ class Leaves:
     """The smallest cells of a plan on a device: their scatterers, and the antenna positions that are kept there."""
 
     def __init__(self, device: Device, plan: FactorizedPlan, scatterers: Scatterers, *, bistatic: bool) -> None:
-        self.device, self.level = device, plan.levels[-1]
+        self.device, self.level, self.channels = device, plan.levels[-1], scatterers.channels
+        weights = scatterers.weights
+        for level in plan.levels:
+            weights = weights.decimated(level.decimation)
         cells, lanes = self.level.cells, device.info.vector_width
         self.constants = TileConstants(device, plan.leaf, bistatic=bistatic, local=True)
-        macros = {k: v for k, v in plan.leaf.macros(bistatic).items() if k != "WRAP"}
-        self.kernel = device.kernel(LEAVES, "leaves", **macros, STRIDE=self.level.stride)
+        self.macros = plan.leaf.macros(bistatic) | weights.macros(scatterers.n_frequencies) | dict(scatterers.macros)
+        self.macros |= {"STRIDE": self.level.stride, "CULL": 0}
+        del self.macros["WRAP"], self.macros["NODES"]
         packed = kept_records(self.level.decimation.kept, scatterers.cells.center, plan.leaf.length, lanes)
         self.pulses, self.n, self.n_used = device.upload(packed), packed.shape[2], len(self.level.decimation.kept)
         vectors, place = vectors_of(cells.first, lanes)
@@ -32,26 +36,36 @@ class Leaves:
         self.vectors, self.offsets = device.upload(vectors), device.upload(self._offsets(scatterers, place))
         self.planes = device.upload(placed(scatterers.planes, place, self.n_offsets))
         self.radius = device.upload(np.full(len(cells), cells.radius, np.float32))
-        self.table = device.upload(plan.leaf.interpolator.table)
+        self.table, self.up = device.upload(plan.leaf.interpolator.table), device.upload(scatterers.up)
+        self.patterns, self.second = weights.upload(device)
+        self.axes, self.range = device.upload(weights.packed_axes(np.arange(self.n_used))), weights.range
 
     @property
     def nbytes(self) -> int:
         """Bytes of a cell's profiles, and of the records by which they are computed."""
         return (8 * self.level.stride + self.constants.nbytes) * self.n_used
 
-    def profiles(self, low: int, high: int) -> Buffer:
-        """Profiles of cells low ... high - 1: a buffer (high - low, kept positions, stride, 2)."""
-        device, n_cells = self.device, len(self.level.cells)
+    def profiles(self, number: int, low: int, high: int) -> tuple[Buffer, np.ndarray]:
+        """Profiles of cells low ... high - 1 in a channel, a buffer (high - low, kept positions, stride, 2); and of
+        their facets those that are seen from their front, at each kept position (n,)."""
+        device, n_cells, channel = self.device, len(self.level.cells), self.channels[number]
         constants = self.constants.compute(self.pulses, self.n, self.references, self.radius, (low, high), n_cells)
         out = device.empty(8 * (high - low) * self.n_used * self.level.stride)
-        numbers = {"n": self.n, "n_used": self.n_used, "n_tiles": n_cells, "n_offsets": self.n_offsets}
+        fronts = device.zeros(4 * (high - low) * self.n_used)
         device.run(
-            self.kernel, (self.n_used, high - low), (1, 1) if device.is_cpu else None,
-            launch_numbers(LEAVES, "leaves", **numbers, first=low),
-            self.pulses, constants, self.references, self.offsets, self.vectors, self.planes, self.table, out,
+            device.kernel(LEAVES, "leaves", **self.macros, **channel.macros), (self.n_used, high - low),
+            (1, 1) if device.is_cpu else None,
+            launch_numbers(
+                LEAVES, "leaves", n=self.n, n_used=self.n_used, n_tiles=n_cells, n_offsets=self.n_offsets, first=low,
+                root=channel.root, second=self.second, wave=channel.wave, scale=channel.scale, ratio=channel.ratio,
+                range=self.range,
+            ),
+            self.pulses, constants, self.references, self.offsets, self.vectors, self.planes, self.up, self.patterns,
+            self.axes, self.table, out, fronts,
         )  # fmt: skip
         device.finish()
-        return out
+        counts = device.download(fronts, np.empty((high - low, self.n_used), np.int32))
+        return out, counts.sum(axis=0, dtype=np.int64)
 
     def _offsets(self, scatterers: Scatterers, place: np.ndarray) -> np.ndarray:
         """Positions about the centres of the cells, m, hi then lo parts, float32 (6, n_offsets)."""

@@ -32,7 +32,7 @@ class FactorizedSpreader:
     antennas: PulseGeometry
     n_samples: int
     budget: float
-    _whole: Buffer | None = field(default=None, init=False)
+    _whole: list[Buffer] | None = field(default=None, init=False)
 
     def __len__(self) -> int:
         return len(self.scatterers)
@@ -62,20 +62,27 @@ class FactorizedSpreader:
             clock.lap("echo")
             for start in range(first, stop, ascent.pulses_at_once):
                 end = min(start + ascent.pulses_at_once, stop)
-                rows = ascent.rows(profiles, cells, range(start, end))
-                clock.lap("echo")
-                spectra = ascent.spectra_of.of(rows, 1, end - start)
-                for column in self.scatterers.channels[0].columns:
-                    samples[start - first : end - first, column] += spectra
-                clock.lap("spectra")
+                for channel, of_channel in zip(self.scatterers.channels, profiles, strict=True):
+                    rows = ascent.rows(of_channel, cells, range(start, end))
+                    clock.lap("echo")
+                    spectra = ascent.spectra_of.of(rows, 1, end - start)
+                    if channel.basis is not None:
+                        spectra = spectra * channel.basis
+                    for column in channel.columns:
+                        samples[start - first : end - first, column] += spectra
+                    clock.lap("spectra")
                 pairs = low * len(pulses) + (cells[1] - low) * (end - first)
                 on_progress(len(self) * pairs // n_cells)
-        return Counts(len(self) * len(pulses))
+        facing_away = ascent.facing_away(first, stop) if self.scatterers.macros["FACETS"] else 0
+        return Counts(len(self) * len(pulses), facing_away=facing_away)
 
-    def _profiles(self, cells: tuple[int, int]) -> Buffer:
-        """Profiles of the largest cells (first, stop)."""
-        if cells != (0, len(self.plan.levels[0].cells)):
-            return self._ascent.profiles(0, *cells)
-        if self._whole is None:
-            self._whole = self._ascent.profiles(0, *cells)
-        return self._whole
+    def _profiles(self, cells: tuple[int, int]) -> list[Buffer]:
+        """Profiles of the largest cells (first, stop), channel by channel."""
+        if self._whole is not None:
+            return self._whole
+        if cells[0] == 0:
+            self._ascent.fronts[:] = 0
+        profiles = [self._ascent.profiles(i, 0, *cells) for i in range(len(self.scatterers.channels))]
+        if cells == (0, len(self.plan.levels[0].cells)):
+            self._whole = profiles
+        return profiles

@@ -13,19 +13,19 @@ from ...model.waveform import Waveform
 from ...numerics import cost_model
 from ...numerics.interpolator_choice import choose_interpolator
 from ...numerics.plan import Plan, carrier_steps
+from ...numerics.polynomials import lagrange
 from ...numerics.pulse_geometry import PulseGeometry
 from ...opencl.device import Device
 from ...scattering.antenna_weights import AntennaWeights
+from ...scattering.kept_amplitudes import AmplitudeSamples
 from ...scattering.scatterers import Points
 from ..factorized.cells import ScattererCells, scatterers_in_window
-from ..factorized.levels import FactorizedPlan, plan_levels
+from ..factorized.levels import FEWEST_PULSES, Amplitudes, FactorizedPlan, plan_levels
 from ..factorized.scatterers import Channel, Scatterers
 from ..factorized.spreader import FactorizedSpreader
 from ..kernel_images import PatchSamples, sample_patches
 from ..spreading import Band, ChannelView, TiledScatterers
 from .direct import PointSpreader, tiled_points
-
-FEWEST_PULSES = 8  # fewer are not decimated
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,14 +61,22 @@ class PointPlan:
         return None if self.direct is None else PointSpreader(*self.direct, view, nodes, tolerance, budget)
 
     def factorized_spreader(
-        self, device: Device, points: Points, view: ChannelView, columns: Sequence[int], budget: float
-    ) -> FactorizedSpreader | None:
-        """What adds points by levels; columns  of the polarisations in which they reflect."""
+        self, device: Device, points: Points, view: ChannelView, nodes: np.ndarray, columns: Sequence[int],
+        budget: float,
+    ) -> FactorizedSpreader | None:  # fmt: skip
+        """What adds points by levels; nodes, budget  as PointSpreader takes them; columns  in which points reflect."""
         if self.factorized is None:
             return None
         cells, numbers, plan = self.factorized
         amplitudes = points.amplitudes[numbers]
-        scatterers = Scatterers(cells, np.stack([amplitudes.real, amplitudes.imag]), (Channel(tuple(columns)),))
+        basis = lagrange(nodes, view.frequencies).astype(np.float32)
+        ratios = (nodes / view.weights.frequency).tolist()
+        channels = tuple(
+            Channel(tuple(columns), None if len(nodes) == 1 else weight, ratio=ratio)
+            for weight, ratio in zip(basis, ratios, strict=True)
+        )
+        planes = np.stack([amplitudes.real, amplitudes.imag])
+        scatterers = Scatterers(cells, planes, channels, view.weights)
         return FactorizedSpreader(device, plan, scatterers, view.antennas, len(view.frequencies), budget)
 
 
@@ -86,35 +94,37 @@ class PreparedPoints:
     waveform: Waveform
     weights: AntennaWeights
     method: str
-    _latest: tuple[PulseGeometry, tuple[Band, float], PointPlan] | None = field(default=None, init=False)
+    _latest: tuple[PulseGeometry, tuple[Band, float, int], PointPlan] | None = field(default=None, init=False)
 
     def __len__(self) -> int:
         return len(self.points)
 
-    def plan(self, antennas: PulseGeometry, band: Band, tolerance: float) -> PointPlan:
+    def plan(self, weights: AntennaWeights, band: Band, tolerance: float, n_nodes: int) -> PointPlan:
         """The plan for one channel; the last one is kept.
+
+        weights  of the channel's antennas;  n_nodes  frequencies at which gains are computed
 
         ToleranceUnreachable: none meets the tolerance. NotApplicable: "factorized" is asked for and not possible.
         """
-        key = band, tolerance
+        key, antennas = (band, tolerance, n_nodes), weights.geometry
         if self._latest is None or self._latest[0] is not antennas or self._latest[1] != key:
-            self._latest = antennas, key, self._planned(antennas, band, tolerance)
+            self._latest = antennas, key, self._planned(weights, band, tolerance, n_nodes)
         return self._latest[2]
 
-    def _planned(self, antennas: PulseGeometry, band: Band, tolerance: float) -> PointPlan:
+    def _planned(self, weights: AntennaWeights, band: Band, tolerance: float, n_nodes: int) -> PointPlan:
+        antennas = weights.geometry
         if self.method != "direct":
-            by_levels = self._by_levels(antennas, band, tolerance)
+            by_levels = self._by_levels(weights, band, tolerance, n_nodes)
             if isinstance(by_levels, PointPlan):
                 return by_levels
             if self.method == "factorized":
                 raise NotApplicable(f'method="factorized" is not possible: {by_levels}; pass method="auto"')
         return PointPlan((self._whole, self._whole.plan(antennas, band, tolerance)))
 
-    def _by_levels(self, antennas: PulseGeometry, band: Band, tolerance: float) -> PointPlan | str:
+    def _by_levels(self, weights: AntennaWeights, band: Band, tolerance: float, n_nodes: int) -> PointPlan | str:
         """The factorised plan, or the reason why the direct one is taken."""
-        forced, pairs = self.method == "factorized", len(self) * len(antennas)
-        if self.weights.is_needed:
-            return "antenna gains and spreading losses change along the track"
+        antennas, forced = weights.geometry, self.method == "factorized"
+        pairs = len(self) * len(antennas)
         if len(antennas) < FEWEST_PULSES:
             return f"the track has {len(antennas)} pulses, and {FEWEST_PULSES} are the fewest that are decimated"
         if not forced and pairs < cost_model.SEARCH_PAYS:
@@ -129,10 +139,18 @@ class PreparedPoints:
                 return "too few points lie inside the range window at every pulse"
             cells = ScattererCells(self.points.positions[numbers])
             numbers = numbers[cells.order]
-        plan = plan_levels(cells, antennas, band, tolerance, lambda leaf: self._image_error(leaf, band))
+        samples, leaf = None, 0.0
+        if weights.is_needed:
+            highest, leaf = band.carrier + band.bandwidth / 2, cost_model.GAIN
+            places, amplitudes = self.points.positions[numbers], self.points.amplitudes[numbers]
+            samples = AmplitudeSamples.of_points(places, amplitudes, weights, highest)
+        kind = Amplitudes(lambda leaf: self._image_error(leaf, band), samples, n_nodes, leaf)
+        plan = plan_levels(cells, antennas, band, tolerance, kind)
         if isinstance(plan, str):
             return plan
-        if not forced and plan.cost > cost_model.MERGING_PAYS * _direct_cost(band, tolerance, len(self)):
+        if not forced and plan.cost > cost_model.MERGING_PAYS * n_nodes * (
+            _direct_cost(band, tolerance, len(self)) + leaf
+        ):
             return "the direct method costs less"
         if seen.all():
             return PointPlan(None, (cells, numbers, plan))
@@ -155,7 +173,8 @@ class PreparedPoints:
     @functools.cached_property
     def _patches(self) -> PatchSamples:
         def amplitudes(numbers: np.ndarray, pulse: int, frequency: float) -> np.ndarray:
-            return self.points.amplitudes[numbers][:, None]
+            gains = self.weights.weights(self.points.positions[numbers], pulse, frequency)
+            return np.asarray((gains * self.points.amplitudes[numbers])[:, None])
 
         return sample_patches(self.points.positions, self._cells.order, self.antennas, self.waveform, amplitudes)
 
