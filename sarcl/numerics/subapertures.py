@@ -39,6 +39,7 @@ class Decimation:
     blocks  (n_blocks, 4) int32: first pulse, number of pulses, first kept pulse, first row of the filter
     filter  (ratio, taps) float32: weights of the kept pulses around a pulse, by its position between two of them
     error   relative error of the filter at the oversampling it was made for
+    places  first and last + 1 of the pulses of each run, and the places of the kept ones, counted from the first
     """
 
     kept: PulseGeometry
@@ -46,6 +47,11 @@ class Decimation:
     blocks: np.ndarray
     filter: np.ndarray
     error: float
+    places: tuple[tuple[int, int, np.ndarray], ...] = ()
+
+    def taken(self, values: np.ndarray) -> np.ndarray:
+        """Values (n, k) of pulses at the kept ones; beyond the ends of runs on the parabola through the last ones."""
+        return np.concatenate([_extended(values[begin:end], at) for begin, end, at in self.places])
 
     @property
     def neighbours(self) -> np.ndarray:
@@ -57,39 +63,40 @@ class Decimation:
 
 def decimated(track: PulseGeometry, ratio: int, taps: int, oversample: float) -> Decimation:
     """Decimate each run by `ratio`; beyond its ends as many are kept as the filter of `taps` needs."""
-    runs, parts, first = [], [], 0
+    runs, spots, first = [], [], 0
     blocks: list[np.ndarray] = []
-    rx_parts, rows = [], []
+    rows: list[int] = []
     for begin, end in track.runs:
         n = end - begin
         n_blocks = -(-n // ratio)
         numbers = np.arange(n_blocks + taps - 1) - (taps // 2 - 1)
         b = np.arange(n_blocks)
         blocks.append(np.stack([begin + b * ratio, np.minimum(ratio, n - b * ratio), first + b, 0 * b], axis=1))
-        places = numbers * ratio
-        parts.append(_positions(track.tx[begin:end], places))
-        if not track.is_monostatic:
-            rx_parts.append(_positions(track.rx[begin:end], places))
+        spots.append((begin, end, numbers * ratio))
         rows += [begin] * len(numbers)
         runs.append((first, first + len(numbers)))
         first += len(numbers)
     z = np.arange(ratio) / ratio - 0.5
     weights = interpolation.least_squares_weights(taps, oversample, z)
-    tx = np.concatenate(parts)
+    tx, *rx = (
+        np.concatenate([_extended(antenna[begin:end], at) for begin, end, at in spots]) for antenna in track.ends
+    )
     kept = PulseGeometry(
         tx,
-        np.concatenate(rx_parts) if rx_parts else tx,
+        rx[0] if rx else tx,
         frequency=track.frequency[rows],
         frequency_step=track.frequency_step[rows],
         runs=tuple(runs),
     )
     kept = replace(kept, reference_range=kept.half_path(np.zeros(3)))
     error = interpolation.line_interpolator(taps, oversample).error
-    return Decimation(kept, ratio, np.concatenate(blocks).astype(np.int32), weights.astype(np.float32), error)
+    return Decimation(
+        kept, ratio, np.concatenate(blocks).astype(np.int32), weights.astype(np.float32), error, tuple(spots)
+    )
 
 
-def _positions(run: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Positions, m (n, 3), of a run at whole indices; beyond its ends on the parabola through its last positions."""
+def _extended(run: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Values (n, k) of a run at whole indices; beyond its ends on the parabola through its last values."""
     n = len(run)
     inside = np.clip(at, 0, n - 1)
     out = run[inside]

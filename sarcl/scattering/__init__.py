@@ -7,6 +7,7 @@ For other folders:
     facet_kinds            which facets are mirrors, which are random, and which are alike
     facet_plan             subdivision and frequency nodes of facets for a tolerance
     facets                 facets ready for the kernel: subdivided, displaced, culled, illuminated
+    kept_amplitudes        error of amplitudes that are interpolated between antenna positions, with phases
     physical_optics        phase integral, Fresnel coefficients and scattering matrix of a planar facet
     pulse_nodes            pulses at which amplitudes are computed, with cubic interpolation between them
     random_surface         cells of rough facets, with a random height and amplitude each

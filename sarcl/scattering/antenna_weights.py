@@ -17,6 +17,7 @@ from ..model.radar import Radar, spreading
 from ..model.trajectory import Trajectory
 from ..model.waveform import Waveform
 from ..numerics.pulse_geometry import PulseGeometry
+from ..numerics.subapertures import Decimation
 from ..opencl.device import Device
 
 if TYPE_CHECKING:
@@ -151,6 +152,14 @@ class AntennaWeights:
         axes = None if self.axes is None else (self.axes[0][pulses], self.axes[1][pulses])
         return replace(self, geometry=geometry, axes=axes)
 
+    def decimated(self, decimation: Decimation) -> AntennaWeights:
+        """Weights at the positions that a decimation of these keeps; beyond the ends of a track antennas turn on."""
+        axes = None
+        if self.axes is not None:
+            tx, rx = (_orthonormal(decimation.taken(one.reshape(-1, 9)).reshape(-1, 3, 3)) for one in self.axes)
+            axes = tx, rx
+        return replace(self, geometry=decimation.kept, axes=axes)
+
     def culled(self, level: float, waveform: Waveform) -> AntennaWeights:
         """The same weights, but 0 in directions where they are below `level` of the peak, over the waveform's band."""
         if self.pair is None:
@@ -207,6 +216,12 @@ class AntennaWeights:
             return np.zeros((1, 18), np.float32)
         both = np.stack([a[pulses].swapaxes(1, 2) for a in self.axes], axis=1)
         return np.ascontiguousarray(both, np.float32).reshape(-1, 18)
+
+
+def _orthonormal(axes: np.ndarray) -> np.ndarray:
+    """The axes nearest to some that are about at right angles (n, 3, 3)."""
+    u, _, v = np.linalg.svd(axes)
+    return np.asarray(u @ v)
 
 
 def weights_of(

@@ -103,13 +103,23 @@ class FacetSet:
         steady = self.lit_rows < 0
         return [part for part in (self._some(steady), self._some(~steady)) if len(part)]
 
-    def steady(self) -> tuple[FacetSet | None, FacetSet | None]:
-        """The facets of which all pulses see the same share, and the others; None: there are none."""
+    def chosen(self, index: np.ndarray) -> FacetSet:
+        """These facets, by rising numbers, with their shadows."""
+        return self._some(index)
+
+    @property
+    def is_changing(self) -> np.ndarray:
+        """Facets (k,) of which pulses see different shares."""
         changing = np.zeros(len(self), bool)
         if self.lit_rows is not None:
             changing |= self.lit_rows >= 0
         if self.illumination is not None:
             changing |= self.illumination.changing[self.kept] & (True if self.sampled is None else self.sampled)
+        return changing
+
+    def steady(self) -> tuple[FacetSet | None, FacetSet | None]:
+        """The facets of which all pulses see the same share, and the others; None: there are none."""
+        changing = self.is_changing
         if not changing.any():
             return self, None
         return None if changing.all() else self._some(~changing), self._some(changing)

@@ -89,7 +89,7 @@ def plan_pulse_nodes(
     n_pulses = len(weights.geometry)
     if len(part) * n_pulses < WORTH or n_pulses < least_pulses(min(SPACINGS)):
         return every(n_pulses)
-    sample, share = _sample(part, np.random.default_rng(0))
+    sample, share = sample_of(part, np.random.default_rng(0))
     geometry = weights.geometry
     steep = steep_pulses(geometry, part.bounds, vertical)
 
@@ -113,7 +113,8 @@ def plan_pulse_nodes(
     return every(n_pulses)
 
 
-def _sample(part: FacetSet, random: np.random.Generator) -> Sample:
+def sample_of(part: FacetSet, random: np.random.Generator) -> Sample:
+    """Up to FACETS of a set, and the number that each represents."""
     if isinstance(part, RoughFacets):
         return part.drawn(FACETS, random)
     some, represents = drawn(areas(part.triangles), FACETS, random)
@@ -156,14 +157,14 @@ def _error(
             needed, which, factors = nodes.of(pulse, pulse + 1)
             near = needed[which[0, 0] :][:ORDER].tolist()
             for one in {*near, pulse} - made.keys():
-                made[one] = _amplitudes(part, weights, one, polarizations, vertical, frequency)
+                made[one] = amplitudes_at(part, weights, one, polarizations, vertical, frequency)
             guess = sum(factor * made[one] for factor, one in zip(factors[0].astype(float).tolist(), near, strict=True))
             wrong += float(share @ (np.abs(guess - made[pulse]) ** 2).sum(axis=1))
             right += typical_power(share * (np.abs(made[pulse]) ** 2).sum(axis=1))
     return float(np.sqrt(wrong / right)) if right else 0.0
 
 
-def _amplitudes(
+def amplitudes_at(
     part: FacetSet,
     weights: AntennaWeights,
     pulse: int,

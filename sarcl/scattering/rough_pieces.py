@@ -249,6 +249,13 @@ class RoughFacets(FacetSet):
         light = self.illumination
         return self if light is None else RoughFacets(self.pieces, light.between(first, stop), self.kept)
 
+    def chosen(self, index: np.ndarray) -> FacetSet:
+        """As of FacetSet."""
+        some = index if self.pieces.some is None else self.pieces.some[index]
+        return RoughFacets(
+            replace(self.pieces, some=some), self.illumination, self.kept[index] if self.illumination else None
+        )
+
     def drawn(self, most: int, random: np.random.Generator) -> tuple[FacetSet, np.ndarray]:
         """Up to `most` pieces, and the number that each represents: as _facet_sampling.py draws them, half of them by
         their areas and half alike; first facets, then a piece of each."""

@@ -29,7 +29,7 @@ from ._planned_echoes import Method, PlannedEchoes
 from ._single_channel import SingleEchoes
 from .echo_output import bytes_of
 from .echo_task import EchoTask
-from .points.factorized import FactorizedSpreader
+from .factorized.spreader import FactorizedSpreader
 from .scene_echoes import Added, SceneEchoes
 from .scene_plan import SHADOWS, parts_of, samples_shadows
 from .scene_preparation import warn_of_curves

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -48,8 +49,11 @@ class TiledFacets(TiledScatterers):
     """Facets prepared for every channel, receiver and pulse.
 
     nodes  Hz (n,), frequencies at which amplitudes are computed, and by what they are scaled: those of `plan`
+    of     prepares some of the facets in the same way;  REFLECTIVITY  its plane among the facets' numbers
     metal  all are perfect conductors;  dispersive  the materials differ from node to node
     """
+
+    REFLECTIVITY = 6
 
     def __init__(
         self, request: EchoRequest, facets: FacetSet, plan: FacetPlan, antennas: PulseGeometry, waveform: Waveform,
@@ -57,6 +61,7 @@ class TiledFacets(TiledScatterers):
     ) -> None:  # fmt: skip
         """antennas, waveform, weights  of all channels: samples of patches are computed for them"""
         device = request.device
+        self.of = lambda some: TiledFacets(request, some, plan, antennas, waveform, weights)
         self.facets, self.facet_plan, nodes = facets, plan, plan.nodes
         self.metal = all(np.isinf(m.conductivity) for m in facets.materials)
         roots = np.stack([facets.roots(float(f)) for f in nodes])
@@ -82,6 +87,14 @@ class TiledFacets(TiledScatterers):
             return sample_patches(positions, order, antennas, waveform, amplitudes)
 
         super().__init__(device, tiling, n_sums if facets.is_mirror else 0, patches)
+
+    @cached_property
+    def numbers(self) -> tuple[np.ndarray, np.ndarray]:
+        """Positions of the facets, m (n, 3), and their numbers as the kernels read them, float32 (k, n)."""
+        if isinstance(self.tiling, PieceTiling):
+            return self.tiling.on_host()
+        order, nodes = np.arange(len(self.facets)), self.facet_plan.nodes
+        return centroids(self.facets.triangles), self.facets.planes(order, nodes, self.metal, self.dispersive)
 
 
 @dataclass(eq=False)

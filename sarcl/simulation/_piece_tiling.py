@@ -51,6 +51,14 @@ class PieceTiling:
             )  # fmt: skip
         return device_tiles
 
+    def on_host(self) -> tuple[np.ndarray, np.ndarray]:
+        """Positions of the pieces, m (n, 3), and their numbers as the kernels read them, float32 (k, n)."""
+        centers, planes = self._placed or self._place()
+        n, size = len(self), self.stride
+        places = self.device.download(centers, np.empty((3, size)))[:, :n].T
+        rows = planes.size // (4 * size)
+        return np.ascontiguousarray(places), self.device.download(planes, np.empty((rows, size), np.float32))[:, :n]
+
     def _place(self) -> tuple[Any, Any]:
         return self.pieces.placed(*self._numbers, self.stride)
 

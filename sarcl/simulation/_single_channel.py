@@ -15,7 +15,7 @@ from .echo_check import measure_error
 from .echo_output import EchoOutput
 from .echo_request import EchoRequest
 from .echo_task import EchoTask
-from .points.factorized import FactorizedSpreader
+from .factorized.spreader import FactorizedSpreader
 from .scene_echoes import Added, ChannelEchoes, SceneEchoes
 from .scene_plan import SeenScene
 from .spreading import Band, Counts, most_pulses

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.errors import NothingSeen, ToleranceUnreachable
+from ..base.errors import NotApplicable, NothingSeen, ToleranceUnreachable
 from ..base.report import SMALLER_TOLERANCE, ErrorTerm, root_sum_square
 from ..model.waveform import Waveform
 from ..numerics.polynomials import chebyshev
@@ -19,11 +19,12 @@ from ..scattering.facets import FacetSet
 from ..scattering.scatterers import Points
 from ..scattering.subdivision import Subdivision
 from ._exact_facets import ExactFacets
+from ._facet_method import facet_echoes
 from ._facet_spreading import FacetSpreader, TiledFacets
 from ._unseen_scene import OUTSIDE_BEAM, OUTSIDE_WINDOW
 from .echo_request import EchoRequest
+from .factorized.spreader import FactorizedSpreader
 from .points.direct import PointSpreader
-from .points.factorized import FactorizedSpreader
 from .points.point_plan import PointPlan, PreparedPoints
 from .scene_plan import NODES
 from .spreading import Band, ChannelView, Counts
@@ -110,7 +111,7 @@ class SceneEchoes:
         with self._unreachable_for_the_caller():
             for band in bands:
                 if self.prepared_points is not None:
-                    self._plan_points(self.prepared_points, antennas, band)
+                    self._plan_points(self.prepared_points, self.weights.at(antennas), band)
                 for tiled in self.tiled_facets:
                     left = self.error_budget / self.gain - tiled.facet_plan.predicted_error
                     tiled.plan(antennas, band, left, least_tolerance=0.0)
@@ -123,10 +124,10 @@ class SceneEchoes:
         except ToleranceUnreachable as refused:
             raise refused.restated(self.request.tolerance, None, "take a larger tolerance") from None
 
-    def _plan_points(self, points: PreparedPoints, antennas: PulseGeometry, band: Band) -> tuple[PointPlan, float]:
+    def _plan_points(self, points: PreparedPoints, weights: AntennaWeights, band: Band) -> tuple[PointPlan, float]:
         """The plan of points, and the error of their weights over the band."""
         error = self.weight_error.of(self.n_nodes, self.error_budget)
-        return points.plan(antennas, band, self.error_budget - error), error
+        return points.plan(weights, band, self.error_budget - error, self.n_nodes), error
 
     @property
     def n_nodes(self) -> int:
@@ -141,15 +142,17 @@ class SceneEchoes:
         view = ChannelView(
             antennas, weights, frequencies, waveform.bandwidth, request.polarizations, request.vertical, request.gated
         )
-        points: tuple[PointSpreader | FactorizedSpreader, ...] = ()
+        points: PointSpreader | None = None
         parts: list[tuple[ErrorTerm, dict[str, Any]]] = []
-        spreaders: list[FacetSpreader | ExactFacets] = []
-        stop = first + len(antennas)
+        spreaders: list[FacetSpreader | ExactFacets | FactorizedSpreader] = []
+        stop, reason = first + len(antennas), ""
         if self.points is not None and self.prepared_points is not None and request.same:
             nodes = chebyshev(waveform.center, waveform.bandwidth, self.n_nodes)
-            plan, error = self._plan_points(self.prepared_points, antennas, view.band)
+            plan, error = self._plan_points(self.prepared_points, weights, view.band)
             tolerance = self.error_budget - error
-            points = tuple(plan.spreaders(request.device, self.points, view, nodes, tolerance, request.budget))
+            points = plan.direct_spreader(view, nodes, tolerance, request.budget)
+            leveled = plan.factorized_spreader(request.device, self.points, view, nodes, request.same, request.budget)
+            spreaders += [] if leveled is None else [leveled]
             parts.append((ErrorTerm("points", plan.predicted_error + error, SMALLER_TOLERANCE), plan.describe()))
         if self.facets is not None and self.subdivision is not None and self.subdivision.plan.is_float64:
             facets = self.facets if stop - first == self.n_pulses else self.facets.between(first, stop)
@@ -160,11 +163,15 @@ class SceneEchoes:
         spread = []
         for tiled in self.tiled_facets:
             facets = tiled.facets if stop - first == self.n_pulses else tiled.facets.between(first, stop)
-            spreader = FacetSpreader(tiled, facets, view, self.error_budget / self.gain, request.budget)
-            words = spreader.plan.describe("spread") | tiled.facet_plan.describe()
-            words |= {"pulses per amplitude": spreader.pulse_nodes.spacing} | self.mesh_warnings | self.shadow_words
-            spread.append((self.gain * spreader.predicted_error, words))
-            spreaders.append(spreader)
+            share = self.error_budget / self.gain
+            echoes = facet_echoes(tiled, facets, view, share, request.budget, method=request.method)
+            spread.append((self.gain * echoes.error, echoes.words | self.mesh_warnings | self.shadow_words))
+            spreaders += echoes.spreaders
+            reason = reason or echoes.reason
+        by_levels = any(isinstance(one, FactorizedSpreader) for one in spreaders)
+        if request.method == "factorized" and not by_levels:
+            text = reason or "few facets in few samples are added up in float64"
+            raise NotApplicable(f'method="factorized" is not possible: {text}; pass method="auto"')
         if spread:  # relative to the norm of the facets that each adds: not more of all of them
             parts.append((ErrorTerm("facets", max(error for error, _ in spread), SMALLER_TOLERANCE), spread[0][1]))
         chosen = max(parts, key=lambda part: part[0].value)[1] if parts else {}
@@ -200,13 +207,13 @@ class SceneEchoes:
 class ChannelEchoes:
     """The echoes of a scene in one channel at one receiver, as they are planned.
 
-    points, spreaders  spreaders of points and of facets
+    points, spreaders  what adds points at each pulse, None where there are none; and what adds other scatterers
     error_terms      relative, of the channel;  plan  in words, of its part with the largest error
     """
 
     scene: SceneEchoes
-    points: tuple[PointSpreader | FactorizedSpreader, ...]
-    spreaders: tuple[FacetSpreader | ExactFacets, ...]
+    points: PointSpreader | None
+    spreaders: tuple[FacetSpreader | ExactFacets | FactorizedSpreader, ...]
     error_terms: tuple[ErrorTerm, ...]
     plan: dict[str, Any]
 
@@ -222,8 +229,9 @@ class ChannelEchoes:
 
     def apart(self) -> tuple[ChannelEchoes, list[FactorizedSpreader]]:
         """The echoes that are added pulse by pulse, and what adds the others, by levels for the whole track."""
-        by_levels = [spreader for spreader in self.points if isinstance(spreader, FactorizedSpreader)]
-        return replace(self, points=tuple(one for one in self.points if isinstance(one, PointSpreader))), by_levels
+        by_levels = [spreader for spreader in self.spreaders if isinstance(spreader, FactorizedSpreader)]
+        rest = tuple(one for one in self.spreaders if not isinstance(one, FactorizedSpreader))
+        return replace(self, spreaders=rest), by_levels
 
     def add(self, samples: np.ndarray, pulses: Sequence[int], done: int, total: int) -> Counts:
         """Add sum_k a_k exp(-j 2 pi f (tau_k - tau_ref)) to samples (n, n_polarizations, n_samples), zeros so far.
@@ -236,11 +244,10 @@ class ChannelEchoes:
             request.report("echo", done + counts.pairs + n, total)
 
         on_progress(0)
-        if self.points:
-            for points in self.points:
-                counts += points.add(samples[:, request.same[0]], pulses, request.clock, on_progress)
+        if self.points is not None:
+            counts += self.points.add(samples[:, request.same[0]], pulses, request.clock, on_progress)
             samples[:, request.same[1:]] = samples[:, request.same[:1]]
-        elif scene.points is not None:  # in these polarisations points send nothing back
+        elif scene.points is not None and not request.same:  # in these polarisations points send nothing back
             counts = Counts(len(scene.points) * len(samples))
         for spreader in self.spreaders:
             counts += spreader.add(samples, pulses, request.clock, on_progress)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from ..base.errors import NotApplicable, NothingSeen, ToleranceUnreachable, warn
+from ..base.errors import NothingSeen, ToleranceUnreachable, warn
 from ..base.report import ErrorTerm
 from ..base.tolerances import askable, rounded_up
 from ..scattering.antenna_weights import AntennaWeights
@@ -101,8 +101,6 @@ def _check_left(request: EchoRequest, points: Points | None, facets: FacetSet | 
 def _prepared_points(plan: ScenePlan, points: Points | None, weights: AntennaWeights) -> PreparedPoints | None:
     """Points with what the plans of all channels share, where any send something back."""
     request, seen = plan.request, plan.seen
-    if request.method == "factorized" and (points is None or not request.same):
-        raise NotApplicable('method="factorized" is for points, and the scene sends back echoes of facets alone')
     if points is None or not request.same:
         return None
     return PreparedPoints(request.device, points, seen.antennas, seen.waveform, weights, request.method)

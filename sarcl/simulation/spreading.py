@@ -234,6 +234,10 @@ class TiledScatterers:
                 lattice = "with scatterers that lie so evenly: the images of the interpolation kernel add up"
                 raise ToleranceUnreachable(tolerance, None, refused.limit, "take a larger tolerance", lattice) from None
 
+    def image_error(self, plan: Plan, band: Band) -> float:
+        """Relative error of the images of a plan's kernel, at least that for scatterers at random places."""
+        return max(plan.interpolator.error, self._image_error(plan, band) if self._n_coherent else 0.0)
+
     def _image_error(self, plan: Plan, band: Band) -> float:
         """Relative error of the images of a plan's kernel."""
         kernel = plan.interpolator

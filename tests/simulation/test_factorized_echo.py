@@ -14,10 +14,11 @@ from sarcl.numerics.device_profiles import SpreadSamples
 from sarcl.numerics.pulse_geometry import PulseGeometry
 from sarcl.reference.equations import point_echo as exact_echo
 from sarcl.reference.merge import expand, merge
-from sarcl.simulation.points import factorized
-from sarcl.simulation.points._levels import plan_levels
-from sarcl.simulation.points._point_cells import PointCells
-from sarcl.simulation.points.point_plan import points_in_window
+from sarcl.scattering.antenna_weights import AntennaWeights
+from sarcl.simulation.factorized._ascent import Ascent
+from sarcl.simulation.factorized.cells import ScattererCells, scatterers_in_window
+from sarcl.simulation.factorized.levels import Amplitudes, plan_levels
+from sarcl.simulation.factorized.scatterers import Channel, Scatterers
 from sarcl.simulation.spreading import Band
 
 CHIRP = sarcl.Waveform.chirp(center=9.6e9, bandwidth=300e6, duration=2e-6)
@@ -157,8 +158,8 @@ def test_points_in_the_window_are_judged_safely():
     positions, track = cloud().positions, circle(arc=0.6)
     ranges = np.linalg.norm(track, axis=1)
     antennas = PulseGeometry(track, track, ranges, near=np.full(200, -12.0), far=np.full(200, 9.0))
-    cells = PointCells(positions)
-    inside = points_in_window(cells, antennas)
+    cells = ScattererCells(positions)
+    inside = scatterers_in_window(cells, antennas)
     delta = np.linalg.norm(track[:, None] - positions[cells.order], axis=-1) - ranges[:, None]
     sees = ((delta >= -12) & (delta <= 9)).all(axis=0)
     assert not (inside & ~sees).any()
@@ -167,7 +168,7 @@ def test_points_in_the_window_are_judged_safely():
 
 def test_cells_hold_their_points():
     positions = cloud(flat=False).positions
-    cells = PointCells(positions)
+    cells = ScattererCells(positions)
     codes, edge = morton_codes(positions)
     assert edge == pytest.approx(np.ptp(positions, axis=0).max())
     assert (np.diff(codes[cells.order].astype(float)) >= 0).all()
@@ -190,12 +191,15 @@ def test_profiles_are_moved_and_interpolated_between_pulses_as_by_the_twin(devic
         raw.tx, raw.tx, raw.reference_range, first=raw.frequency[0], step=raw.frequency_step[0],
         n_samples=raw.n_samples, near=-1e3, far=1e3,
     )  # fmt: skip
-    cells = PointCells(scene.positions)
-    plan = plan_levels(cells, antennas, Band(raw.n_samples, 300e6, 9.6e9), 1e-3, lambda leaf: leaf.interpolator.error)
-    spreader = factorized.FactorizedSpreader(
-        device, plan, cells, scene.amplitudes[cells.order], antennas, raw.n_samples, 2e9
+    cells = ScattererCells(scene.positions)
+    plan = plan_levels(
+        cells, antennas, Band(raw.n_samples, 300e6, 9.6e9), 1e-3, Amplitudes(lambda leaf: leaf.interpolator.error)
     )
-    ascent, root = factorized._Ascent(spreader), plan.levels[0]
+    amplitudes = scene.amplitudes[cells.order]
+    scatterers = Scatterers(
+        cells, np.stack([amplitudes.real, amplitudes.imag]), (Channel((0,)),), AntennaWeights(antennas, 9.6e9)
+    )
+    ascent, root = Ascent(device, plan, scatterers, antennas, raw.n_samples, 2e9), plan.levels[0]
     shape = len(root.cells), len(root.decimation.kept), root.stride
     random = np.random.default_rng(1)
     smooth = np.zeros(shape, np.complex64)  # a few scatterers in each cell, spread by a long window
@@ -289,10 +293,6 @@ def test_what_cannot_be_factorised_is_refused_with_the_reason_and_added_directly
             raw = factorized_echo(cloud(), positions, 1e-3, device=device, method="auto")
             assert raw.report.plan["method"] == "spread"
         assert error_of(raw, cloud()) <= 1e-3
-    with pytest.raises(NotApplicable, match="echoes of facets alone"):
-        factorized_echo(sarcl.Scene.from_heights([-1, 1], [-1, 1], np.zeros((2, 2))), line())
-    with pytest.raises(NotApplicable, match="antenna gains"):
-        factorized_echo(cloud(), line(), radar=sarcl.Radar(power=1.0))
     with pytest.raises(ValueError, match="method"):
         factorized_echo(cloud(), line(), method="quick")
 

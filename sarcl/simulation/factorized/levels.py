@@ -17,9 +17,11 @@ from ...numerics.plan import Plan, carrier_steps
 from ...numerics.pulse_geometry import PulseGeometry
 from ...numerics.subapertures import Decimation, decimated, filter_error, rates, smooth_runs
 from ...opencl import fft
+from ...scattering.kept_amplitudes import AmplitudeSamples
 from ..spreading import Band
-from ._point_cells import CellLevel, PointCells
+from .cells import CellLevel, ScattererCells
 
+FEWEST_PULSES = 8  # fewer are not decimated
 SPACINGS = (1.5, 2.0, 2.5, 3.0, 4.0)  # profile samples per 1/bandwidth
 TAPS = (4, 6, 8)  # taps of the interpolators along range and along the track
 DEEPEST = 12  # depth of the smallest cells: beyond it cells of a million points hold one each
@@ -27,6 +29,7 @@ STEPS = (1, 2, 3, 4)  # depths between two levels
 TRIES = 4  # candidates whose errors are computed in full
 MOVING_SHARE = 0.7  # share of the tolerance for moving profiles between levels; the rest is for the smallest cells
 SPREADING_SHARE = 0.6  # share of that rest for the kernel that spreads points
+AMPLITUDE_SHARE = 0.2  # share of the tolerance for amplitudes that change along the track; all else has the rest
 SHARE_SLACK = 1.3  # ratio of a filter's error to its share, at most: other errors are often below theirs
 SMALLER_RATIO = 0.75  # factor on a decimation ratio whose error is too large
 POINTS = 64  # points along the Morton curve at which the change of direction is estimated
@@ -97,14 +100,26 @@ class Candidate(NamedTuple):
     cost: float
 
 
-def plan_levels(
-    cells: PointCells, antennas: PulseGeometry, band: Band, tolerance: float, image_error: Callable[[Plan], float]
-) -> FactorizedPlan | str:
-    """The cheapest plan whose predicted error is at most `tolerance`, or the reason why there is none.
+@dataclass(frozen=True, eq=False)
+class Amplitudes:
+    """What plans of levels must know of scatterers beside their places.
 
-    image_error  of the kernel of a plan: larger than that of the kernel where points lie evenly
+    image_error  of the kernel of a plan: larger than that of the kernel where scatterers lie evenly
+    samples      of amplitudes that change along the track; None: they do not
+    channels     in which scatterers are added;  leaf  cost of the amplitude of one at a kept position, in contributions
     """
-    case = _Case(cells, antennas, band, tolerance, image_error)
+
+    image_error: Callable[[Plan], float]
+    samples: AmplitudeSamples | None = None
+    channels: int = 1
+    leaf: float = 0.0
+
+
+def plan_levels(
+    cells: ScattererCells, antennas: PulseGeometry, band: Band, tolerance: float, amplitudes: Amplitudes
+) -> FactorizedPlan | str:
+    """The cheapest plan whose predicted error is at most `tolerance`, or the reason why there is none."""
+    case = _Case(cells, antennas, band, tolerance, amplitudes)
     candidates = sorted(case.candidates(), key=lambda candidate: candidate.cost)
     reason = "neighbouring pulses see even the smallest cells of points from directions that differ too much"
     for candidate in candidates[:TRIES]:
@@ -120,13 +135,15 @@ class _Case:
 
     def __init__(
         self,
-        cells: PointCells,
+        cells: ScattererCells,
         antennas: PulseGeometry,
         band: Band,
         tolerance: float,
-        image_error: Callable[[Plan], float],
+        amplitudes: Amplitudes,
     ) -> None:
-        self.cells, self.band, self.tolerance, self.image_error = cells, band, tolerance, image_error
+        self.cells, self.band, self.amplitudes = cells, band, amplitudes
+        self.changing = 0.0 if amplitudes.samples is None else AMPLITUDE_SHARE * tolerance
+        self.tolerance = tolerance - self.changing
         group = groups(len(antennas), antennas.frequency, antennas.frequency_step)
         self.antennas = replace(antennas, runs=tuple(smooth_runs(antennas.tx, antennas.rx, group)))
         self.highest = float(antennas.frequency.max()) + band.bandwidth / 2
@@ -199,10 +216,10 @@ class _Case:
             total += n_cells * n_pulses * cost_model.expanding(samples, between.taps, filter_taps)
             n_pulses = n_pulses / ratio + filter_taps
         total += n_pulses * (
-            len(self.cells) * cost_model.LEAF_POINT * cost_model.TAPS[spread.taps]
+            len(self.cells) * (cost_model.LEAF_POINT * cost_model.TAPS[spread.taps] + self.amplitudes.leaf)
             + n_cells * (cost_model.LEAF_ROW + cost_model.LEAF_SAMPLE * samples)
         )
-        total += cost_model.CELL_POINT * len(self.cells)
+        total = self.amplitudes.channels * total + cost_model.CELL_POINT * len(self.cells)
         return total / (len(self.cells) * len(self.antennas))
 
     def build(self, candidate: Candidate) -> FactorizedPlan | str:
@@ -212,16 +229,23 @@ class _Case:
         for depth in candidate.depths[-2::-1]:
             levels.insert(0, self.cells.joined(depth, levels[0]))
         decimations: list[Decimation] = []
+        samples, left = self.amplitudes.samples, self.changing
+        weights, changes = samples and samples.weights, 0.0
         for cells, ratio in zip(levels, candidate.ratios, strict=True):
+            most = (left - changes) / (len(levels) - len(decimations))
             while True:
-                decimation = decimated(source, ratio, candidate.filter_taps, candidate.fine)
+                decimation, changed = decimated(source, ratio, candidate.filter_taps, candidate.fine), 0.0
                 filtered = self._filter_error(source, decimation, cells)
-                if filtered <= SHARE_SLACK * share or ratio <= 2:
+                if samples and weights and filtered <= SHARE_SLACK * share:
+                    changed = samples.change(weights, decimation, cells.radius)
+                if (filtered <= SHARE_SLACK * share and changed <= most) or ratio <= 2:
                     break
                 ratio = max(2, int(ratio * SMALLER_RATIO))
-            error += filtered + candidate.between.error
+            if changed > most:
+                return "amplitudes change too much between neighbouring pulses"
+            error, changes = error + filtered + candidate.between.error, changes + changed
             decimations.append(decimation)
-            source = decimation.kept
+            source, weights = decimation.kept, weights and weights.decimated(decimation)
         error += error_bounds.sum_rounding(64, self.band.n_samples) * len(levels)
         leaf = self._leaf(candidate, levels[-1], self.tolerance - error)
         if leaf is None:
@@ -229,7 +253,8 @@ class _Case:
         sigma = 2 * float(self.antennas.frequency_step.max()) * candidate.length / SPEED_OF_LIGHT
         reaches = _reaches(levels, sigma, leaf.interpolator.taps, candidate.between.taps)
         planned = tuple(Level(*v) for v in zip(levels, decimations, reaches, strict=True))
-        return FactorizedPlan(planned, candidate.between, leaf, error + leaf.predicted_error, candidate.cost)
+        predicted = error + leaf.predicted_error + changes
+        return FactorizedPlan(planned, candidate.between, leaf, predicted, candidate.cost)
 
     def _filter_error(self, source: PulseGeometry, decimation: Decimation, cells: CellLevel) -> float:
         """Largest error of interpolation between the kept pulses, in cells where directions change fastest."""
@@ -252,7 +277,7 @@ class _Case:
                     best = Plan(candidate.spread, candidate.length, 0, mode, order, error, cost)
         if best is None:
             return None
-        images = self.image_error(best)
+        images = self.amplitudes.image_error(best)
         if best.predicted_error + images > tolerance:
             return None
         return replace(best, predicted_error=best.predicted_error + images)

@@ -1,4 +1,4 @@
-"""Points in cubic cells: an octree along the Morton curve, of which only cells that hold points exist."""
+"""Scatterers in cubic cells: an octree along the Morton curve, of which only cells that hold scatterers exist."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ import numpy as np
 
 from ...base.boxes import box
 from ...base.morton import DEPTH, morton_codes
+from ...numerics.pulse_geometry import PulseGeometry
 
+WINDOW_DEPTHS = (0, 3, 6)  # depths of cells that are looked for in the range window, coarse ones first
 PLANAR = 5.6  # ratio of the numbers of cells at two depths, 4 on a plane and 8 in a volume, below which they are flat
 
 
@@ -49,7 +51,7 @@ class CellLevel:
         return (np.searchsorted(self.first, smaller.first[:-1], side="right") - 1).astype(np.int32)
 
 
-class PointCells:
+class ScattererCells:
     """Points along the Morton curve of the cube that holds them, and their cells of any depth.
 
     order      of the points as they were given;  positions  m (n, 3), in that order, about `center`, m (3,)
@@ -100,3 +102,24 @@ class PointCells:
         apart = smaller.centers - np.repeat((low + high) / 2, np.diff([*begin, len(smaller)]), axis=0)
         radii = np.maximum.reduceat(np.sqrt(np.einsum("ij,ij->i", apart, apart)) + smaller.radii, begin)
         return CellLevel(first, low, high, radii)
+
+
+def scatterers_in_window(cells: ScattererCells, antennas: PulseGeometry) -> np.ndarray:
+    """Whether scatterers, in the order of the cells, lie in all range windows, judged by cells: bool (n,)."""
+    inside = np.zeros(len(cells), bool)
+    undecided = np.zeros(1, int)  # first scatterers of cells of the depth before that may be inside or not
+    for depth, before in zip(WINDOW_DEPTHS, (0, *WINDOW_DEPTHS), strict=False):
+        first, larger = cells.first(depth), cells.first(before)
+        parents = larger[np.searchsorted(larger, first[:-1], side="right") - 1]
+        candidates = np.flatnonzero(np.isin(parents, undecided))
+        crossing = []
+        for begin, end in zip(first[candidates].tolist(), first[candidates + 1].tolist(), strict=True):
+            low, high = box(cells.positions[begin:end])
+            margin = antennas.depth((low + high) / 2 + cells.center)
+            radius = float(np.linalg.norm(high - low)) / 2 * (1 + 1e-9)
+            if margin.min() >= radius:
+                inside[begin:end] = True
+            elif margin.max() >= -radius:
+                crossing.append(begin)
+        undecided = np.array(crossing, int)
+    return inside
