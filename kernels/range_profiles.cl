@@ -65,16 +65,16 @@ __kernel void pad(__global const REAL *restrict from, int length, int padding, i
 }
 
 // global size (length, rows)
-//   sums  (parts, n_rows, 3, length + 2 padding, 2) from row `first` on: profiles are the sums of all parts, and of planes
-//         1 and 2, a total and its rest
+//   sums  (parts, n_rows, planes, length + 2 padding, 2) from row `first` on: profiles are the sums of all parts, and of the
+//         last two planes, a total and its rest
 //   out   (rows, length, 2)
-__kernel void fold(__global const REAL *restrict sums, int parts, int n_rows, int padding, int first,
+__kernel void fold(__global const REAL *restrict sums, int parts, int n_rows, int planes, int padding, int first,
                    __global REAL *restrict out) {
     int bin = get_global_id(0), length = get_global_size(0), stride = length + 2 * padding;
     size_t row = first + get_global_id(1);
     pair re = make_pair(0, 0), im = make_pair(0, 0);
     for (int part = 0; part < parts; part++) {
-        __global const REAL *total = sums + 2 * ((part * (size_t)n_rows + row) * 3 + 1) * stride;
+        __global const REAL *total = sums + 2 * ((part * (size_t)n_rows + row + 1) * planes - 2) * stride;
         __global const REAL *rest = total + 2 * stride;
         for (int at = (bin + padding) % length; at < stride; at += length) {
             re = pair_add(re, exact_sum(total[2 * at], rest[2 * at]));

@@ -45,8 +45,26 @@
 #define AMPLITUDES(a, tile, i) \
     ((a) + (GROUPED ? (tile) * (2 * CHANNELS * TILE) + (i) : ((tile) * (TILE / VW) + (i)) * (2 * CHANNELS * VW)))
 #define PLANE (GROUPED ? TILE : VW)
-#define FRONT 1  // bits of a facet's mark at a pulse node: seen from its front; sends something back
-#define BRIGHT 2
+// Marks of the facets of a vector at a pulse node: a bit for each that is seen from its front, and above these bits another for
+// each that sends something back.
+#if VW <= 4
+typedef uchar mark;
+#elif VW == 8
+typedef ushort mark;
+#else
+typedef uint mark;
+#endif
+#define EVERY_LANE (VW < 32 ? (1u << VW) - 1 : ~0u)
+
+// A bit for each lane that is not 0.
+static inline uint lane_bits(iv lanes) {
+    int lane[VW];
+    uint bits = 0;
+    STORE(lanes, 0, lane);
+#pragma unroll
+    for (int l = 0; l < VW; l++) bits |= lane[l] != 0 ? 1u << l : 0;
+    return bits;
+}
 
 static inline void put_channel(__global float *out, int channel, complex_v a, fv scale) {
     STORE(scale * a.re, 0, out + 2 * channel * PLANE);
@@ -75,14 +93,14 @@ typedef struct {
 //   patterns, second, axes (pulse nodes, 18), range, reach (6)   see gains.clh;  radius (n_tiles)   m, of the facets' centres
 //   first    this call's first tile
 //   out      (pulse nodes, tiles of this call, TILE/VW, CHANNELS, 2, VW), GROUPED: (., ., CHANNELS, 2, TILE)   re, im
-//   marks    (pulse nodes, tiles of this call, TILE)                       FRONT, BRIGHT
+//   marks    (pulse nodes, tiles of this call, TILE/VW)                    see `mark`
 __kernel void facet_amplitudes(facet_amplitudes_numbers given, __global const float *restrict constants,
                                __global const float *restrict offsets, __global const float *restrict facets,
                                __global const float *restrict parts, __global const float *restrict nodes,
                                __global const float *restrict up, __global const float *restrict patterns,
                                __global const float *restrict axes, __global const float *restrict reach,
                                __global const float *restrict radius, __global float *restrict out,
-                               __global uchar *restrict marks) {
+                               __global mark *restrict marks) {
     int q = get_global_id(0) / ITEMS, k = given.first + get_global_id(1);
     float3 vertical = vload3(0, up), other = vload3(1, up);
     __global const float *c = constants + (k * (size_t)given.n + q) * N_CONST;
@@ -93,7 +111,6 @@ __kernel void facet_amplitudes(facet_amplitudes_numbers given, __global const fl
     for (int i = get_global_id(0) % ITEMS; i < TILE / VW; i += ITEMS) {
         size_t at = (size_t)k * (TILE / VW) + i, node_vector = here * (TILE / VW) + i;
         __global float *out_i = AMPLITUDES(out, here, i);
-        float is_front[VW], is_bright[VW];
         offset x = load_offset(offsets, at, given.n_offsets);
         triple edge_1 = load_triple(facets + F_EDGE * (size_t)given.n_offsets, at, given.n_offsets);
         triple edge_2 = load_triple(facets + (F_EDGE + 3) * (size_t)given.n_offsets, at, given.n_offsets);
@@ -112,10 +129,7 @@ __kernel void facet_amplitudes(facet_amplitudes_numbers given, __global const fl
             root_of_share = sqrt(part_share);
             amplitude = part_share > 0 ? amplitude : (fv)0.0f;
         }
-        STORE(front ? (fv)1.0f : (fv)0.0f, 0, is_front);
-        STORE(fabs(amplitude), 0, is_bright);
-#pragma unroll
-        for (int l = 0; l < VW; l++) marks[node_vector * VW + l] = (is_front[l] != 0 ? FRONT : 0) | (is_bright[l] > 0 ? BRIGHT : 0);
+        marks[node_vector] = lane_bits(front) | lane_bits(amplitude != 0) << VW;
         if (largest(fabs(amplitude)) <= 0) {
             for (int channel = 0; channel < CHANNELS; channel++)
                 put_channel(out_i, channel, c_make((fv)0.0f, (fv)0.0f), (fv)0.0f);
@@ -163,14 +177,14 @@ static inline fv level_at(__global const uchar *levels, __global const int *mome
     }
     return LOAD(0, out);
 }
-#define IS_LIT(level) (!SHADED || (level) > 0)
 
 typedef struct {
     int n, n_used, n_tiles, n_offsets, first, n_here, last, flush, stride, origin;
 } spread_facets_numbers;
 
-// What facets send back at a pulse node, or between two, added to profiles. global size (pulses of this call, times
-// the group where GROUPED; splits): work-item, or group, (p, s) adds tiles s, s + splits, ... of this call to row (s, p).
+// What facets send back at a pulse node, or between two, added to profiles. global size (pulses of this call over PULSES, times
+// the group where GROUPED; splits): work-item, or group, (p, s) adds tiles s, s + splits, ... of this call to the rows of split
+// s and of PULSES pulses: while a tile lies in a processor's cache.
 //   pulse, constants, tile, offsets, table   as in backproject.cl, constants of all tiles
 //   amplitudes, marks   of the tiles first ... first + n_here - 1, as facet_amplitudes leaves them
 //   pulse_nodes (n_used, 2)           first of the PULSE_NODES nodes of a pulse, and the nearest
@@ -180,86 +194,97 @@ typedef struct {
 //   axes (n_used, 18), reach, radius  see gains.clh
 //   last     facets in the last tile; the rest of it is blank
 //   flush    tiles added in float32 before they join the compensated total
-//   rows     (splits, n_used, CHANNELS, 3, stride, 2)   zeroed by the caller: sum, total, its error; delay 0 at `origin`
+//   rows     (splits, n_used, CHANNELS, 2, stride, 2)   zeroed by the caller: total, its error; delay 0 at `origin`
 //   done     (3, splits, n_used)      counts go on: facets in the range window; of those seen from their front; left out of
 //            the beam
 __kernel void spread_facets(spread_facets_numbers given, __global const float *restrict pulse,
                             __global const float *restrict constants, __global const float *restrict tile,
                             __global const float *restrict offsets, __global const float *restrict amplitudes,
-                            __global const uchar *restrict marks, __global const int *restrict pulse_nodes,
+                            __global const mark *restrict marks, __global const int *restrict pulse_nodes,
                             __global const float *restrict shares, __global const uchar *restrict levels,
                             __global const int *restrict moments, __global const float *restrict between,
                             __global const float *restrict axes, __global const float *restrict reach,
-                            __global const float *restrict radius, __global const float *restrict table, __global float *rows,
-                            __global int *restrict done) {
-    int p = get_global_id(0) / ITEMS, split = get_global_id(1), inside_count = 0, front_count = 0, unlit_count = 0, added = 0;
+                            __global const float *restrict radius, __global const float *restrict table, __global float *sums,
+                            __global float *rows, __global int *restrict done) {
+    int first_pulse = get_global_id(0) / ITEMS * PULSES, n_pulses = min(PULSES, given.n_used - first_pulse);
+    int split = get_global_id(1), added = 0, inside_count[PULSES], front_count[PULSES], unlit_count[PULSES];
     WINDOW_SPACE row_window window;
-    spread_rows sums = begin_rows(&window, rows_of(rows, split, given.n_used, p, given.stride), given.stride, given.origin);
-    int from = pulse_nodes[2 * p], nearest_node = pulse_nodes[2 * p + 1];
+    spread_rows into[PULSES];
+    for (int r = 0; r < PULSES; r++) {
+        inside_count[r] = front_count[r] = unlit_count[r] = 0;
+        size_t row = (size_t)split * given.n_used + first_pulse + r;
+        into[r] = begin_rows(&window, sums, rows, row, given.stride, given.origin);
+    }
     for (int k = given.first + split; k < given.first + given.n_here; k += get_global_size(1)) {
-        __global const float *c = constants + (k * (size_t)given.n + p) * N_CONST;
-        int state = as_int(c[C_STATE]);
-        if (state == OUTSIDE) continue;
         int n_facets = k == given.n_tiles - 1 ? given.last : TILE;
-        if (CULL && out_of_beam(load_transmitter(c), load_receiver(c), radius[k], axes + 18 * (size_t)p, reach)) {
-            if (sums.item == 0) unlit_count += n_facets;
-            continue;
-        }
-        for (int i = sums.item; i < TILE / VW; i += ITEMS) {
-            size_t at = (size_t)k * (TILE / VW) + i, tile_at_node[PULSE_NODES];
-#pragma unroll
-            for (int q = 0; q < PULSE_NODES; q++) tile_at_node[q] = ((size_t)from + q) * given.n_here + (k - given.first);
-            size_t at_nearest = ((size_t)nearest_node * given.n_here + (k - given.first)) * (TILE / VW) + i;
-            tile_point x = load_tile_point(offsets, at, given.n_offsets, tile, k, given.n_tiles, 0);
-            phase_position where = locate(c, pulse, p, given.n, x);
-            fv inside = 1, level = 1;
-            if (state == CROSSING) inside = keep_inside(c, &where);
-            float is_inside[VW], lit[VW];
-            STORE(inside, 0, is_inside);
-            if (SHADED) level = level_at(levels, moments + 2 * p, between[p], at, given.n_offsets);
-            inside *= level;
-            if (SHADED) STORE(level, 0, lit);
-            int any_mark = 0;
-#pragma unroll
-            for (int l = 0; l < VW; l++) {
-                int counts = is_inside[l] != 0 && i * VW + l < n_facets;
-                inside_count += counts;
-                front_count += counts && (marks[at_nearest * VW + l] & FRONT);
-#pragma unroll
-                for (int q = 0; q < PULSE_NODES; q++)
-                    any_mark |= counts && IS_LIT(lit[l]) ? marks[(tile_at_node[q] * (TILE / VW) + i) * VW + l] : 0;
+        for (int r = 0; r < n_pulses; r++) {
+            int p = first_pulse + r, from = pulse_nodes[2 * p], nearest_node = pulse_nodes[2 * p + 1];
+            __global const float *c = constants + (k * (size_t)given.n + p) * N_CONST;
+            int state = as_int(c[C_STATE]);
+            if (state == OUTSIDE) continue;
+            if (CULL && out_of_beam(load_transmitter(c), load_receiver(c), radius[k], axes + 18 * (size_t)p, reach)) {
+                if (into[r].item == 0) unlit_count[r] += n_facets;
+                continue;
             }
-            if (!GROUPED && !(any_mark & BRIGHT)) continue;  // items of a group go on together
-
-            fv sine, cosine, w[TAPS];
-            carrier(where, &sine, &cosine);
-            sine *= inside;
-            cosine *= inside;
-            iv j;
-            tap_weights(first_tap(where.t, where.base, given.stride, given.origin, &j), table, w);
-            for (int channel = 0; channel < CHANNELS; channel++) {
-                complex_v a = c_make((fv)0.0f, (fv)0.0f);
+            for (int i = into[r].item; i < TILE / VW; i += ITEMS) {
+                size_t at = (size_t)k * (TILE / VW) + i, tile_at_node[PULSE_NODES];
+                uint marks_near = 0;
 #pragma unroll
                 for (int q = 0; q < PULSE_NODES; q++) {
-                    __global const float *from_node = AMPLITUDES(amplitudes, tile_at_node[q], i) + 2 * channel * PLANE;
-                    fv weight_of_node = (fv)(PULSE_NODES == 1 ? 1.0f : shares[PULSE_NODES * p + q]);
-                    a.re = fma(weight_of_node, LOAD(0, from_node), a.re);
-                    a.im = fma(weight_of_node, LOAD(0, from_node + PLANE), a.im);
+                    tile_at_node[q] = ((size_t)from + q) * given.n_here + (k - given.first);
+                    marks_near |= marks[tile_at_node[q] * (TILE / VW) + i];
                 }
-                // times exp(-j 2 pi cycles)
-                fv echo_re = fma(a.re, cosine, a.im * sine), echo_im = fma(a.im, cosine, -a.re * sine);
-                add_scatterers(&sums, channel, (iv)(any_mark & BRIGHT), j, w, echo_re, echo_im);
+                size_t at_nearest = ((size_t)nearest_node * given.n_here + (k - given.first)) * (TILE / VW) + i;
+                tile_point x = load_tile_point(offsets, at, given.n_offsets, tile, k, given.n_tiles, 0);
+                phase_position where = locate(c, pulse, p, given.n, x);
+                uint is_facet = i * VW + VW <= n_facets ? EVERY_LANE : (1u << max(n_facets - i * VW, 0)) - 1;
+                fv inside = 1;
+                if (state == CROSSING) {
+                    inside = keep_inside(c, &where);
+                    is_facet &= lane_bits(inside != 0);
+                }
+                inside_count[r] += popcount(is_facet);
+                front_count[r] += popcount(is_facet & marks[at_nearest]);
+                uint is_bright = marks_near >> VW & is_facet;
+                if (SHADED) {
+                    fv level = level_at(levels, moments + 2 * p, between[p], at, given.n_offsets);
+                    is_bright = largest(level) > 0 ? is_bright : 0;
+                    inside *= level;
+                }
+                if (!GROUPED && !is_bright) continue;  // items of a group go on together
+
+                fv sine, cosine, w[TAPS];
+                carrier(where, &sine, &cosine);
+                sine *= inside;
+                cosine *= inside;
+                iv j;
+                tap_weights(first_tap(where.t, where.base, given.stride, given.origin, &j), table, w);
+                for (int channel = 0; channel < CHANNELS; channel++) {
+                    complex_v a = c_make((fv)0.0f, (fv)0.0f);
+#pragma unroll
+                    for (int q = 0; q < PULSE_NODES; q++) {
+                        __global const float *from_node = AMPLITUDES(amplitudes, tile_at_node[q], i) + 2 * channel * PLANE;
+                        fv weight_of_node = (fv)(PULSE_NODES == 1 ? 1.0f : shares[PULSE_NODES * p + q]);
+                        a.re = fma(weight_of_node, LOAD(0, from_node), a.re);
+                        a.im = fma(weight_of_node, LOAD(0, from_node + PLANE), a.im);
+                    }
+                    // times exp(-j 2 pi cycles)
+                    fv echo_re = fma(a.re, cosine, a.im * sine), echo_im = fma(a.im, cosine, -a.re * sine);
+                    add_scatterers(&into[r], channel, (iv)is_bright, j, w, echo_re, echo_im);
+                }
             }
         }
-        if (++added % given.flush == 0) empty_rows(&sums);
+        if (++added % given.flush == 0)
+            for (int r = 0; r < n_pulses; r++) empty_rows(&into[r]);
     }
-    empty_rows(&sums);
-    inside_count = sum_of_items(&sums, inside_count);
-    front_count = sum_of_items(&sums, front_count);
-    if (sums.item == 0) {
-        size_t at = (size_t)split * given.n_used + p, n_counts = (size_t)get_global_size(1) * given.n_used;
-        done[at] += inside_count;
-        done[n_counts + at] += front_count;
-        done[2 * n_counts + at] += unlit_count;
+    for (int r = 0; r < n_pulses; r++) {
+        empty_rows(&into[r]);
+        int inside = sum_of_items(&into[r], inside_count[r]), front = sum_of_items(&into[r], front_count[r]);
+        if (into[r].item == 0) {
+            size_t at = (size_t)split * given.n_used + first_pulse + r, n_counts = (size_t)get_global_size(1) * given.n_used;
+            done[at] += inside;
+            done[n_counts + at] += front;
+            done[2 * n_counts + at] += unlit_count[r];
+        }
     }
 }

@@ -123,16 +123,16 @@ class SpreadSamples:
         """Bytes on the device per row, beside the profiles themselves, at most."""
         return self._batches.row_bytes + 8.0 * self.n_samples if self._batches else 0.0
 
-    def of(self, sums: Buffer, parts: int, rows: int) -> np.ndarray:
-        """Samples (rows, n_samples) of a buffer (parts, rows, 3, length + 2 padding), complex64.
+    def of(self, sums: Buffer, parts: int, rows: int, planes: int = 3) -> np.ndarray:
+        """Samples (rows, n_samples) of a buffer (parts, rows, planes, length + 2 padding), complex64.
 
-        A profile is the sum of all parts, and of planes 1 and 2 of each: a total and its rest.
+        A profile is the sum of all parts, and of the last two planes of each: a total and its rest.
         """
         device = self.device
         if self._batches is None:
             stride = self.length + 2 * self.pad
-            made = device.download(sums, np.empty((parts, rows, 3, stride), np.complex64))
-            total = made[:, :, 1:].sum(axis=(0, 2), dtype=np.complex128).astype(np.complex64)
+            made = device.download(sums, np.empty((parts, rows, planes, stride), np.complex64))
+            total = made[:, :, -2:].sum(axis=(0, 2), dtype=np.complex128).astype(np.complex64)
             return range_profiles.to_samples(device, total, self.n_samples, self.interpolator)
         fold, cut = (device.kernel("range_profiles.cl", name, **SINGLE) for name in ("fold", "cut"))
         if self._correction is None:
@@ -142,7 +142,7 @@ class SpreadSamples:
             self._out = None
             self._out = device.empty(8 * rows * self.n_samples)
         for first, count, work in self._batches.of(rows):
-            device.run(fold, (self.length, count), None, sums, parts, rows, self.pad, first, work)
+            device.run(fold, (self.length, count), None, sums, parts, rows, planes, self.pad, first, work)
             self._batches.transform()
             device.run(cut, (self.n_samples, count), None, work, self.length, self._correction, first, self._out)
         return device.download(self._out, np.empty((rows, self.n_samples), np.complex64))

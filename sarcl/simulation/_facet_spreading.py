@@ -28,15 +28,13 @@ from ._piece_tiling import PieceTiling
 from .echo_request import EchoRequest
 from .kernel_images import PatchSamples, sample_patches
 from .spreading import (
-    GROUP,
     ChannelView,
     Counts,
     HostTiling,
+    Rows,
     TiledScatterers,
     Tiling,
-    is_grouped,
     most_pulses,
-    splits,
     terms,
 )
 
@@ -176,14 +174,16 @@ class FacetSpreader:
         device, scatterers, plan, weights = self.device, self.tiled, self.plan, self.weights
         self.tiles = scatterers.tiles(plan.per_tile)
         tiles, nodes, bistatic = self.tiles, scatterers.facet_plan.nodes, not self.antennas.is_monostatic
-        self.grouped = is_grouped(device)
+        self.channels = len(nodes) * len(self.polarizations)
+        stride = plan.length + 2 * range_profiles.padding(plan.interpolator)
+        self.rows = Rows(device, stride, self.channels, len(self.antennas), tiles.n_tiles)
         macros = {**plan.macros(bistatic), **weights.macros(len(nodes)), "TILE": tiles.per_tile}
         macros |= {
             "METAL": int(scatterers.metal),
             "DISPERSIVE": int(scatterers.dispersive),
             "ROUGH": int(self.facets.is_rough),
             "PULSE_NODES": self.pulse_nodes.order,
-            "GROUPED": int(self.grouped),
+            **self.rows.macros,
             "PARTLY": int(self.partly),
             "SHADED": int(self.facets.illumination is not None),
             **{name: int(name in self.polarizations) for name in POLARIZATIONS},
@@ -199,9 +199,6 @@ class FacetSpreader:
         self.reach, self.up = device.upload(weights.limits), device.upload(vertical_axes(vertical))
         self.table = device.upload(plan.interpolator.table)
         self.flush = max(1, int(terms(tolerance) / tiles.per_tile))
-        self.channels = len(nodes) * len(self.polarizations)
-        self.stride = plan.length + 2 * range_profiles.padding(plan.interpolator)
-        self.splits = splits(device, len(self.antennas), tiles.n_tiles, self.grouped)
         self.spectra_of = SpreadSamples(device, self.n_samples, plan.interpolator, plan.length)
 
     def _blocks(self, budget: float) -> tuple[int, int]:
@@ -211,7 +208,7 @@ class FacetSpreader:
         if spacing > 1:
             most = max(most, MOST_PULSES)
         per_pulse: float = self.constants.nbytes * tiles.n_tiles * (2 if spacing > 1 else 1)
-        per_pulse += (24 * self.stride * self.splits + self.spectra_of.row_bytes) * self.channels
+        per_pulse += self.rows.pulse_bytes + self.spectra_of.row_bytes * self.channels
         room = budget / 2
         pulses = max(1, min(most, int(room / 2 / per_pulse)) // lanes) * lanes
         n_nodes = pulses if spacing == 1 else pulses // spacing + self.pulse_nodes.order + 1
@@ -237,7 +234,7 @@ class FacetSpreader:
             start, stop = levels.start, levels.stop
             rows, pair_counts = self._profiles(levels)
             clock.lap("echo")
-            spectra = self.spectra_of.of(rows, self.splits, (stop - start) * self.channels)
+            spectra = self.spectra_of.of(rows, self.rows.splits, (stop - start) * self.channels, 2)
             spectra = spectra.reshape(stop - start, len(self.polarizations), len(self.basis), self.n_samples)
             for i, name in enumerate(self.columns):
                 for m, weight in enumerate(self.basis):
@@ -280,17 +277,15 @@ class FacetSpreader:
         if self.facets.illumination is not None:
             seen = device.upload(np.stack([level[tiles.order] for level in levels.levels]))
         parts = device.upload(self._parts(start, stop)) if self.partly else between
-        rows = device.zeros(24 * self.splits * used * self.stride * self.channels)
-        done = device.zeros(12 * self.splits * used)
-        n_offsets, each, ends = tiles.n_offsets, 1, (1, 1) if device.is_cpu else None
-        if self.grouped:
-            each, ends = GROUP, (GROUP, 1)
+        (sums, rows), splits = self.rows.buffers(used), self.rows.splits
+        done = device.zeros(12 * splits * used)
+        n_offsets, group = tiles.n_offsets, self.rows.group
         size = min(self.tiles_at_once, tiles.n_tiles) * len(at) * tiles.per_tile
         made, marks = device.empty(8 * size * self.channels), device.empty(size)
         for first in range(0, tiles.n_tiles, self.tiles_at_once):
             n_block = min(self.tiles_at_once, tiles.n_tiles - first)
             device.run(
-                self.amplitudes, (each * len(at), n_block), ends,
+                self.amplitudes, (self.rows.items * len(at), n_block), group,
                 launch_numbers(
                     KERNELS, "facet_amplitudes", n=n_nodes, n_offsets=n_offsets, second=self.second,
                     range=self.weights.range, first=first,
@@ -299,16 +294,17 @@ class FacetSpreader:
                 self.reach, tiles.radius, made, marks,
             )  # fmt: skip
             device.run(
-                self.spread, (each * used, self.splits), ends,
+                self.spread, self.rows.size(used), group,
                 launch_numbers(
                     KERNELS, "spread_facets", n=n, n_used=used, n_tiles=tiles.n_tiles, n_offsets=n_offsets,
-                    first=first, n_here=n_block, last=tiles.last, flush=self.flush, stride=self.stride,
-                    origin=self.stride // 2,
+                    first=first, n_here=n_block, last=tiles.last, flush=self.flush,
+                    stride=self.rows.stride, origin=self.rows.stride // 2,
                 ),
                 pulse, constants, tiles.references, tiles.offsets, made, marks, which_here, shares_here, seen,
-                moments, between, axes, self.reach, tiles.radius, self.table, rows, done, steps=n_block / self.splits,
+                moments, between, axes, self.reach, tiles.radius, self.table, sums, rows, done,
+                steps=n_block / splits,
             )  # fmt: skip
-        counts = device.download(done, np.empty((3, self.splits, used), np.int32))
+        counts = device.download(done, np.empty((3, splits, used), np.int32))
         return rows, counts.sum(axis=(1, 2), dtype=np.int64)
 
     def _parts(self, start: int, stop: int) -> np.ndarray:

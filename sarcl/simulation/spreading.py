@@ -17,13 +17,15 @@ from ..numerics.error_bounds import FLOAT32
 from ..numerics.plan import LEAST_TOLERANCE, Plan, carrier_steps, cheapest, least
 from ..numerics.pulse_geometry import PulseGeometry
 from ..numerics.tiles import Tiles, tile_points
-from ..opencl.device import Device
+from ..opencl.device import Buffer, Device
 from ..scattering.antenna_weights import AntennaWeights
 from .kernel_images import PatchSamples
 
 PER_TILE = (256, 64)
 GROUP = 64  # work-items that add up a row together: ITEMS of kernels/spread_group.clh
 LOCAL = 12 * 1024  # bytes of local memory that they take, with 8 taps
+SUMS = 4  # sums of a row with vectors of lanes (kernels/spread_taps.clh)
+TOGETHER = 8  # pulses for which a work-item adds the scatterers of a tile: rows of so many stay in a core's cache
 GROUPED_ITEMS = 100_000  # work-items of a launch, of groups: more than a GPU runs at once
 
 
@@ -254,22 +256,57 @@ def _chunk(n_scatterers: int, tolerance: float) -> int:
     return min(n_scatterers, max(min(PER_TILE), int(terms(tolerance))))
 
 
-def is_grouped(device: Device) -> bool:
-    """Whether work-groups add rows up, in local memory (kernels/spread_group.clh); else each row has one work-item."""
-    return device.info.vector_width == 1 and device.shares(LOCAL, GROUP)
+class Rows:
+    """Rows of samples on a device, which a kernel adds scatterers to: macros of kernels/spread_rows.clh.
+
+    splits  rows of each pulse and channel, each of a share of the tiles;  grouped  work-groups add rows up, in local memory
+    """
+
+    def __init__(self, device: Device, stride: int, channels: int, n_pulses: int, n_tiles: int) -> None:
+        """stride  samples of a row;  channels  rows of a pulse;  n_pulses, n_tiles  in all"""
+        self.device, self.stride, self.channels = device, stride, channels
+        lanes = device.info.vector_width > 1
+        self.grouped = not lanes and device.shares(LOCAL, GROUP)
+        self._pulses, self._sums = (TOGETHER, SUMS) if lanes else (1, 1)
+        self.items = GROUP if self.grouped else 1
+        launched = min(n_pulses, most_pulses(device)) if self.grouped else n_pulses
+        wanted = GROUPED_ITEMS if self.grouped else 4 * device.info.units
+        splits = -(-wanted // (self.items * -(-launched // self._pulses)))
+        self.splits = int(min(splits, n_tiles, n_tiles if self.grouped else 64))
+        self._plane = 0 if self.grouped else self._sums * ((stride + 15) // 8 * 8)
+        self._buffer: tuple[int, Buffer] | None = None
+
+    @property
+    def macros(self) -> dict[str, int]:
+        """Build-time macros."""
+        return {"SUMS": self._sums, "PULSES": self._pulses, "GROUPED": int(self.grouped)}
+
+    @property
+    def pulse_bytes(self) -> float:
+        """Bytes on the device per pulse."""
+        return float(8 * self.splits * self.channels * (2 * self.stride + self._plane))
+
+    @property
+    def group(self) -> tuple[int, int] | None:
+        """Work-items per group."""
+        return (self.items, 1) if self.grouped or self.device.is_cpu else None
+
+    def size(self, n_pulses: int) -> tuple[int, int]:
+        """Work-items of a launch for so many pulses."""
+        return self.items * -(-n_pulses // self._pulses), self.splits
+
+    def buffers(self, n_pulses: int) -> tuple[Buffer, Buffer]:
+        """Sums, which a kernel leaves at zero as it takes them, and rows, zero: (splits, pulses, channels, 2, stride)."""
+        rows = self.splits * n_pulses * self.channels
+        if self._buffer is None or self._buffer[0] < rows:
+            self._buffer = None  # frees the smaller buffer first
+            self._buffer = rows, self.device.zeros(max(8 * rows * self._plane, 16))
+        return self._buffer[1], self.device.zeros(16 * rows * self.stride)
 
 
 def most_pulses(device: Device) -> int:
     """Pulses of a block: enough to keep every unit busy, few enough for the progress to be seen."""
     return max(64, 16 * device.info.units)
-
-
-def splits(device: Device, n_pulses: int, n_tiles: int, grouped: bool = False) -> int:
-    """Partial sums per pulse: enough work-items for the device."""
-    if grouped:
-        at_once = min(n_pulses, most_pulses(device))
-        return int(min(-(-GROUPED_ITEMS // (GROUP * at_once)), n_tiles))
-    return int(min(max(1, -(-4 * device.info.units // n_pulses)), n_tiles, 64))
 
 
 def terms(tolerance: float) -> float:

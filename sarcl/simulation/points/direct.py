@@ -20,7 +20,7 @@ from ...opencl.launch_numbers import launch_numbers
 from ...scattering.antenna_weights import AntennaWeights
 from ...scattering.scatterers import Points
 from ..kernel_images import sample_patches
-from ..spreading import GROUP, ChannelView, Counts, HostTiling, TiledScatterers, is_grouped, most_pulses, splits, terms
+from ..spreading import ChannelView, Counts, HostTiling, Rows, TiledScatterers, most_pulses, terms
 
 
 def tiled_points(
@@ -70,7 +70,7 @@ class PointSpreader:
             n_pulses = stop - start
             profiles, n_added, n_dark = kernel.profiles(start, stop)
             clock.lap("echo")
-            spectra = kernel.spectra_of.of(profiles, kernel.splits, n_pulses * n_nodes)
+            spectra = kernel.spectra_of.of(profiles, kernel.rows.splits, n_pulses * n_nodes, 2)
             spectra = spectra.reshape(n_pulses, n_nodes, samples.shape[1])
             block = samples[start - first : stop - first]
             block += spectra[:, 0] if n_nodes == 1 else np.einsum("pmf,mf->pf", spectra, basis)
@@ -89,20 +89,18 @@ class _PointKernel:
         self.points, self.plan, self.view, self.device = points, plan, spreader.view, points.device
         device, n_nodes, bistatic = points.device, len(spreader.nodes), not antennas.is_monostatic
         self.tiles = tiles = points.tiles(plan.per_tile)
-        self.n_nodes, self.grouped = n_nodes, is_grouped(device)
+        stride = plan.length + 2 * range_profiles.padding(plan.interpolator)
+        self.rows = Rows(device, stride, n_nodes, len(antennas), tiles.n_tiles)
         macros = {**plan.macros(bistatic), **weights.macros(n_nodes), "TILE": tiles.per_tile}
         self.tile_constants = TileConstants(device, plan, bistatic=bistatic)
-        self.kernel = device.kernel("spread_points.cl", "spread", **macros, GROUPED=int(self.grouped))
+        self.kernel = device.kernel("spread_points.cl", "spread", **macros, **self.rows.macros)
         self.table = device.upload(plan.interpolator.table)
         self.ratios = device.upload((spreader.nodes / weights.frequency).astype(np.float32))
         self.patterns, self.second = weights.upload(device)
         self.reach = device.upload(weights.limits)
         self.flush = max(1, int(terms(spreader.tolerance) / tiles.per_tile))
-        self.stride = plan.length + 2 * range_profiles.padding(plan.interpolator)
-        self.splits = splits(device, len(antennas), tiles.n_tiles, self.grouped)
         self.spectra_of = SpreadSamples(device, len(spreader.view.frequencies), plan.interpolator, plan.length)
-        per_profile = 24 * self.stride * self.splits + self.spectra_of.row_bytes
-        per_pulse = self.tile_constants.nbytes * tiles.n_tiles + per_profile * n_nodes
+        per_pulse = self.tile_constants.nbytes * tiles.n_tiles + self.rows.pulse_bytes + self.spectra_of.row_bytes * n_nodes
         most, lanes = min(most_pulses(device), int(spreader.budget / 2 / per_pulse)), device.info.vector_width
         self.pulses_at_once = max(1, most // lanes) * lanes
 
@@ -115,23 +113,20 @@ class _PointKernel:
         constants = self.tile_constants.compute(
             pulse, n, tiles.references, tiles.radius, every_tile, tiles.n_tiles, int(self.view.gated)
         )
-        rows = device.zeros(24 * self.splits * n_pulses * self.stride * self.n_nodes)
-        done = device.zeros(8 * self.splits * n_pulses)
+        (sums, rows), splits = self.rows.buffers(n_pulses), self.rows.splits
+        done = device.zeros(8 * splits * n_pulses)
         axes = device.upload(weights.packed_axes(np.arange(start, stop)))
-        size, group = (n_pulses, self.splits), (1, 1) if device.is_cpu else None
-        if self.grouped:
-            size, group = (GROUP * n_pulses, self.splits), (GROUP, 1)
         device.run(
-            self.kernel, size, group,
+            self.kernel, self.rows.size(n_pulses), self.rows.group,
             launch_numbers(
                 "spread_points.cl", "spread", n=n, n_used=n_pulses, n_tiles=tiles.n_tiles, n_offsets=tiles.n_offsets,
-                second=self.second, range=weights.range, last=tiles.last, flush=self.flush, stride=self.stride,
-                origin=self.stride // 2,
+                second=self.second, range=weights.range, last=tiles.last, flush=self.flush,
+                stride=self.rows.stride, origin=self.rows.stride // 2,
             ),
             pulse, constants, tiles.references, tiles.offsets, tiles.planes, self.ratios, self.patterns, axes,
-            self.reach, tiles.radius, self.table, rows, done, steps=tiles.n_tiles / self.splits,
+            self.reach, tiles.radius, self.table, sums, rows, done, steps=tiles.n_tiles / splits,
         )  # fmt: skip
         device.finish()
-        counts = device.download(done, np.empty((2, self.splits, n_pulses), np.int32))
+        counts = device.download(done, np.empty((2, splits, n_pulses), np.int32))
         n_added, n_dark = counts.sum(axis=(1, 2), dtype=np.int64).tolist()
         return rows, n_added, n_dark
