@@ -224,8 +224,8 @@ class ChannelEchoes:
 
     def of(self, scene: SceneEchoes) -> ChannelEchoes:
         """The same for another request for the scene, without what is kept on the device from call to call."""
-        points = tuple(replace(one) if isinstance(one, FactorizedSpreader) else one for one in self.points)
-        return replace(self, scene=scene, points=points)
+        spreaders = (replace(one) if isinstance(one, FactorizedSpreader) else one for one in self.spreaders)
+        return replace(self, scene=scene, spreaders=tuple(spreaders))
 
     def apart(self) -> tuple[ChannelEchoes, list[FactorizedSpreader]]:
         """The echoes that are added pulse by pulse, and what adds the others, by levels for the whole track."""
