@@ -6,6 +6,7 @@ on the command line and its table in the guide are made from its record.
 
 from __future__ import annotations
 
+import functools
 import inspect
 from collections.abc import Callable
 from dataclasses import Field, dataclass, field, fields, replace
@@ -48,6 +49,7 @@ class Options:
                 object.__setattr__(self, name, details.check(name, getattr(self, name)))
 
 
+@functools.cache  # a call of a verb makes several records
 def described(record: type[Options]) -> dict[str, tuple[Field[Any], Option]]:
     """Field and Option of every option of a record, in the order of its signature: its own ones, then those that it
     inherits. TypeError for an option that nothing documents."""

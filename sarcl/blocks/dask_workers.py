@@ -114,20 +114,23 @@ def _losses() -> tuple[type[BaseException], ...]:
     return CancelledError, KilledWorker, CommClosedError, ClosedClientError
 
 
-def device_class(client: Client, device: Devices) -> DeviceClass:
-    """Class of the devices of all workers together, for plans. Opens the devices.
-
-    ImportError without dask, TypeError for another kind of client, RuntimeError where it has no workers.
-    """
+def checked(client: object) -> Client:
+    """`client`, a distributed.Client: ImportError without dask, TypeError for another kind of client, RuntimeError
+    where it has no workers."""
     try:
         from distributed import Client
     except ImportError as exc:
         raise ImportError(f"cluster= needs dask ({exc}): pip install 'sarcl[dask]'") from None
     if not isinstance(client, Client):
         raise TypeError(f"cluster is a {type(client).__name__}; wanted a dask.distributed.Client")
-    places = _places(client)
-    if not places:
+    if not client.nthreads():
         raise RuntimeError("cluster has no workers; start some, and client.wait_for_workers(1)")
+    return client
+
+
+def device_class(client: Client, device: Devices) -> DeviceClass:
+    """Class of the devices of all workers together, for plans. Opens the devices; raises what `checked` does."""
+    places = _places(checked(client))
     infos = [client.submit(_info, device, place, workers=[w], pure=False) for w, place in places.items()]
     return DeviceClass.of(client.gather(infos))
 

@@ -65,9 +65,13 @@ class EchoEngine:
         """scene  prepared as planned"""
         self.method, self.scene = planned.method, scene
         self.bands = PulseBands(planned.channels.shape)
-        self.least = min(float(self.method.least(scene)), float(self.bands.n_bands))
         self.most = float(pulses_at_once(self.bands.shape, True, scene.request.budget))
         self.passes = len(scene) * self.method.runs // self.bands.n_bands
+
+    @property
+    def least(self) -> float:
+        """Pulses of a block, at least."""
+        return float(self.method.least(self.scene))
 
     def blocks(self, nbytes: float) -> list[Run]:
         """See Engine: no block needs more of the device than another."""

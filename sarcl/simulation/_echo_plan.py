@@ -48,6 +48,10 @@ class EchoPlan:
         """The plan of a task."""
         array = task.options.array
         channels = SingleChannel(task) if array is None or is_single(array) else ArrayChannels(task, array)
+        if task.options.cluster is not None:
+            from ..blocks.dask_workers import checked
+
+            checked(task.options.cluster)
         piece = task.options.piece(task.options.out is not None, "raw.h5")
         clock.lap("plan")
         return cls(task, channels, clock.seconds, piece)

@@ -96,8 +96,9 @@ class SingleEchoes:
         return self.runs
 
     def least(self, scene: SceneEchoes) -> float:
-        """Pulses of a block, at least: by levels all blocks repeat the work on small cells."""
-        return np.inf if self.channel(scene).apart()[1] else most_pulses(scene.request.device)
+        """Pulses of a block, at least: where profiles by levels are too large to be kept, blocks repeat their work."""
+        kept = all(one.keeps_profiles for one in self.channel(scene).apart()[1])
+        return most_pulses(scene.request.device) if kept else np.inf
 
     def fresh(self) -> SingleEchoes:
         """The same for another device: nothing is planned yet."""

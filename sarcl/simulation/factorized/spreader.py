@@ -38,6 +38,11 @@ class FactorizedSpreader:
         return len(self.scatterers)
 
     @property
+    def keeps_profiles(self) -> bool:
+        """Whether profiles of the largest cells stay on the device: later calls of `add` repeat no work on cells."""
+        return self._ascent.cells_at_once >= len(self.plan.levels[0].cells)
+
+    @property
     def seconds(self) -> float:
         """About the seconds of one core that all pulses take."""
         return 1e-6 * cost_model.SPREAD_POINT * self.plan.cost * len(self) * len(self.antennas)
