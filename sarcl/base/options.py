@@ -6,7 +6,6 @@ on the command line and its table in the guide are made from its record.
 
 from __future__ import annotations
 
-import functools
 import inspect
 from collections.abc import Callable
 from dataclasses import Field, dataclass, field, fields, replace
@@ -49,14 +48,17 @@ class Options:
                 object.__setattr__(self, name, details.check(name, getattr(self, name)))
 
 
-@functools.cache  # a call of a verb makes several records
+_DESCRIBED: dict[type[Options], dict[str, tuple[Field[Any], Option]]] = {}
+
+
 def described(record: type[Options]) -> dict[str, tuple[Field[Any], Option]]:
     """Field and Option of every option of a record, in the order of its signature: its own ones, then those that it
     inherits. TypeError for an option that nothing documents."""
-    places = {f.name: _declared(record, f) for f in fields(record)}
-    return {
-        f.name: (f, places[f.name][1]) for f in sorted(fields(record), key=lambda f: places[f.name][0])
-    }  # sorted() keeps the order of equal ones
+    if record not in _DESCRIBED:  # a call of a verb makes several records
+        places = {f.name: _declared(record, f) for f in fields(record)}
+        ordered = sorted(fields(record), key=lambda f: places[f.name][0])  # keeps the order of equal ones
+        _DESCRIBED[record] = {f.name: (f, places[f.name][1]) for f in ordered}
+    return _DESCRIBED[record]
 
 
 def _declared(record: type[Options], own: Field[Any]) -> tuple[tuple[int, int], Option]:

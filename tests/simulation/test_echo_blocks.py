@@ -40,6 +40,7 @@ FDA = sarcl.AntennaArray.linear(5, spacing=0.015, frequency_step=20e6, axis=(0, 
 BEYOND = sarcl.Trajectory(TRACK.times, TRACK.positions + np.array([0.0, 40.0, 5.0]), TRACK.velocities)
 ORBIT = sarcl.Orbit.kepler(6.88e6, 0.001, 1.7, span=(-200, 400))
 
+WIDE = {"range_window": (-3000, 3000)}
 CASES = {
     "points": (POINTS, {}),
     "by levels": (POINTS, {"method": "factorized"}),
@@ -61,6 +62,12 @@ def echo(scene=POINTS, track=TRACK, **options):
 def whole():
     """Echoes of POINTS in one go."""
     return echo()
+
+
+@pytest.fixture(scope="module")
+def whole_wide():
+    """The same with WIDE range profiles, of which 64 pulses are worth a file."""
+    return echo(**WIDE)
 
 
 def same(one, two):
@@ -166,14 +173,14 @@ def test_a_piece_that_finds_another_run_at_its_file_leaves_its_tiles(whole, tmp_
 # ---- resuming
 
 
-def test_a_run_that_was_stopped_goes_on(whole, tmp_path):
+def test_a_run_that_was_stopped_goes_on(whole_wide, tmp_path):
     path = tmp_path / "a.h5"
     with pytest.raises(Stopped):
-        echo(out=path, resume=True, progress=stop_after(0.6))
+        echo(out=path, resume=True, progress=stop_after(0.6), **WIDE)
     assert tiles(tmp_path) and not path.exists()
     calls = []
-    raw = echo(out=path, progress=lambda *a: calls.append(a))
-    assert same(raw, whole) and "from files" in raw.report.plan
+    raw = echo(out=path, progress=lambda *a: calls.append(a), **WIDE)
+    assert same(raw, whole_wide) and "from files" in raw.report.plan
     assert calls[-1][1] == calls[-1][2] < 300 * 200
     assert names(tmp_path) == ["a.h5"]
 
@@ -184,12 +191,12 @@ def test_a_progress_function_that_raises_leaves_nothing_of_a_short_run(tmp_path)
     assert names(tmp_path) == []
 
 
-def test_a_long_run_keeps_its_tiles_when_it_fails(whole, tmp_path, monkeypatch):
+def test_a_long_run_keeps_its_tiles_when_it_fails(whole_wide, tmp_path, monkeypatch):
     monkeypatch.setattr(checkpoint, "time", SimpleNamespace(monotonic=itertools.count(0, 100.0).__next__))
     with pytest.raises(Stopped):
-        echo(out=tmp_path / "a.h5", progress=stop_after(0.6))
+        echo(out=tmp_path / "a.h5", progress=stop_after(0.6), **WIDE)
     assert tiles(tmp_path)
-    assert same(echo(out=tmp_path / "a.h5"), whole) and names(tmp_path) == ["a.h5"]
+    assert same(echo(out=tmp_path / "a.h5", **WIDE), whole_wide) and names(tmp_path) == ["a.h5"]
 
 
 def test_a_full_disk_for_tiles_is_a_warning_and_the_echoes_are_made(whole, tmp_path, monkeypatch, caplog):
@@ -239,7 +246,8 @@ random = np.random.default_rng(1)
 scene = sarcl.Scene.points(random.uniform(-9, 9, (4000, 3)), random.standard_normal(4000))
 chirp = sarcl.Waveform.chirp(center=9.6e9, bandwidth=200e6, duration=5e-8)
 track = sarcl.Trajectory.circle(radius=5e3, height=3e3, arc=0.1, n_pulses=6400)
-print(sarcl.echo(scene, chirp, track, out=sys.argv[1], check=False, method="direct").report.plan.get("from files"))
+options = {"check": False, "method": "direct", "range_window": (-200, 200)}
+sarcl.echo(scene, chirp, track, out=sys.argv[1], **options)
 """
 
 
@@ -454,12 +462,12 @@ def test_workers_of_a_cluster_make_the_bits_of_one_device(case, client):
         assert raw.report.contributions_skipped == one.report.contributions_skipped
 
 
-def test_a_cluster_keeps_finished_tiles_as_one_device_does(client, whole, tmp_path):
+def test_a_cluster_keeps_finished_tiles_as_one_device_does(client, whole_wide, tmp_path):
     with pytest.raises(Stopped):
-        echo(cluster=client, out=tmp_path / "a.h5", resume=True, progress=stop_after(0.4))
+        echo(cluster=client, out=tmp_path / "a.h5", resume=True, progress=stop_after(0.4), **WIDE)
     assert tiles(tmp_path)
-    raw = echo(cluster=client, out=tmp_path / "a.h5")
-    assert "from files" in raw.report.plan and same(raw, whole) and names(tmp_path) == ["a.h5"]
+    raw = echo(cluster=client, out=tmp_path / "a.h5", **WIDE)
+    assert "from files" in raw.report.plan and same(raw, whole_wide) and names(tmp_path) == ["a.h5"]
 
 
 def test_a_worker_that_is_killed_is_replaced(client, whole):

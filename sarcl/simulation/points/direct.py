@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -54,6 +55,10 @@ class PointSpreader:
     tolerance: float
     budget: float
 
+    @functools.cached_property
+    def _kernel(self) -> _PointKernel:
+        return _PointKernel(self)
+
     def add(
         self, samples: np.ndarray, pulses: Sequence[int], clock: Clock, on_progress: Callable[[int], object]
     ) -> Counts:
@@ -61,7 +66,7 @@ class PointSpreader:
 
         on_progress is called with the number of pairs of point and pulse that are done.
         """
-        kernel, n_nodes = _PointKernel(self), len(self.nodes)
+        kernel, n_nodes = self._kernel, len(self.nodes)
         basis = lagrange(self.nodes, self.view.frequencies).astype(np.float32)
         clock.lap("scene")
         counts, first, end = Counts(), pulses[0], pulses[-1] + 1
