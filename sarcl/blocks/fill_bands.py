@@ -41,11 +41,11 @@ class BandFiller:
         job, bands, checkpoint = self.job, self.job.bands, self.checkpoint
         run = (0, bands.n_bands) if run is None else run
         there, tallies = [], list[tuple[int, Tally]]()
-        for found, values, tally in checkpoint.found(*run) if checkpoint else ():
+        for part, values, tally in checkpoint.found(*run) if checkpoint else ():
             if flat is not None:
-                flat[bands.extent(*found)] = values
-            there.append(found)
-            tallies.append((found[0], tally))
+                flat[bands.extent(*part)] = values
+            there.append(part)
+            tallies.append((part[0], tally))
         todo = gaps(there, *run)
         units = sum(bands.count(*part) for part in todo)
         total, reported = job.passes * units, -1

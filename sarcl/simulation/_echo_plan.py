@@ -89,8 +89,8 @@ class EchoPlan:
         options, request, checkpoint = self.task.options, self.request(clock), None
         output = None if self.piece else stack.enter_context(self._output())  # room is found before the work
         if options.out is not None:
-            kept = True if self.piece else options.resume
-            checkpoint = Checkpoint(options.out, echo_job(self.task, self.channels.shape), kept)
+            resume = True if self.piece else options.resume
+            checkpoint = Checkpoint(options.out, echo_job(self.task, self.channels.shape), resume)
             stack.push(checkpoint)
         finished = checkpoint.finished() if self.piece and checkpoint else None
         if isinstance(finished, PhaseHistory):

@@ -129,13 +129,15 @@ def test_the_samples_of_a_pulse_do_not_depend_on_memory_for_samples(tmp_path):
         assert same(echo(scene, max_bytes=2e6, out=tmp_path / f"{case}.h5", **options), one)
 
 
-def test_orbits_are_computed_in_pieces_too(tmp_path):
+@pytest.mark.parametrize("options", [{}, {"array": FDA}], ids=["one antenna", "array"])
+def test_orbits_are_computed_in_pieces_too(options, tmp_path):
     start = 100.0
     track = ORBIT.trajectory(start=start, prf=1700.0, n_pulses=90)
     place = sarcl.Scene.points(ORBIT.geolocate(start + 0.026, 7.2e5, side="right")[None] + np.eye(3))
-    one = echo(place, track, range_window=(-30, 30))
+    options = {"range_window": (-30, 30), **options}
+    one = echo(place, track, **options)
     for i in (1, 2, 3):
-        pieces = echo(place, track, range_window=(-30, 30), out=tmp_path / "a.h5", tile=(i, 3))
+        pieces = echo(place, track, out=tmp_path / "a.h5", tile=(i, 3), **options)
     assert same(pieces, one) and one.report.plan["receiver"] == "at the echo's arrival"
 
 
