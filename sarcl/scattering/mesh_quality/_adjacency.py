@@ -56,12 +56,20 @@ def adjacency_of(triangles: np.ndarray) -> MeshAdjacency:
 
 
 def components(n: int, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """The number of the component each of n nodes is in (n,), a and b linked; numbered in the order of the nodes."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
+    """The number of the component each of n nodes is in (n,), a and b linked; numbered in the order of the nodes.
 
-    links = coo_array((np.ones(len(a), np.int8), (a, b)), shape=(n, n))
-    return np.asarray(connected_components(links, directed=False)[1])
+    Links join the roots of trees, the larger number to the smaller; then every node goes to its root.
+    """
+    root = np.arange(n)
+    while len(a):
+        low = np.minimum(root[a], root[b])
+        for ends in (a, b):
+            np.minimum.at(root, root[ends], low)
+        while not np.array_equal(nearer := root[root], root):
+            root = nearer
+        apart = root[a] != root[b]
+        a, b = a[apart], b[apart]
+    return np.asarray(np.unique(root, return_inverse=True)[1])
 
 
 def uncut(triangles: np.ndarray, j: MeshAdjacency, kind: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
