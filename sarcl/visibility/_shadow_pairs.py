@@ -154,7 +154,7 @@ def _overlapping(
 def _overlap_of_all(
     low: np.ndarray, high: np.ndarray, least: np.ndarray, most: np.ndarray, inside: np.ndarray
 ) -> np.ndarray:
-    """Whether each of the boxes `inside`, from low to high, overlaps each other box, from least to most, bool (m, n)."""
+    """Whether boxes `inside`, from low to high, overlap each other box, from least to most, bool (m, n)."""
     apart = [
         (low[inside, axis, None] > most[None, :, axis]) | (high[inside, axis, None] < least[None, :, axis])
         for axis in range(2)

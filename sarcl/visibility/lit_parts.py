@@ -78,7 +78,6 @@ class FacetPieces:
         return cls(triangles, two_sided, np.ones(k, bool), triangles, np.arange(k))
 
 
-
 def _largest(values: np.ndarray) -> np.ndarray:
     """Largest of three values at the corners of each facet (n, 3): numpy takes ten times as long along so short an
     axis."""
