@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..base.vectors import unit
+from ..base.vectors import cross, unit
 from ..opencl.device import Device
 from ..opencl.launch_numbers import launch_numbers
 from ..scene.triangles import areas, centroids, edges, normals
@@ -49,7 +49,7 @@ class Receivers:
         """Facets `which` as the kernels read them, about `origin` (n, RECEIVER)."""
         triangles, center, normal = self.triangles[which], self.center[which], self.normal[which]
         along = unit(triangles[:, 1] - triangles[:, 0])
-        across = np.cross(normal, along)
+        across = cross(normal, along)
         flat = np.stack(
             [((triangles - center[:, None]) * axis[:, None]).sum(axis=2) for axis in (along, across)], axis=2
         )
