@@ -28,7 +28,7 @@ log = logging.getLogger(__name__)
 
 JOB = "job.json"
 # options that change no sample, or are those of a track
-RUN = ("out", "device", "progress", "max_bytes", "check", "receiver")
+RUN = ("out", "device", "progress", "max_bytes", "check", "receiver", "resume", "tile", "cluster")
 
 
 class TrackFiles:

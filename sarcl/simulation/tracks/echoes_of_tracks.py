@@ -49,6 +49,8 @@ class EchoesOfTracks:
         instance("waveform", waveform, Waveform)
         for i, one_track in enumerate(track):
             instance(f"track[{i}]", one_track, Trajectory)
+        if options.tile is not None:
+            raise ValueError("tile is for one track; of a list, give each run its own tracks and folder")
         receivers = cls._receivers(options.receiver, len(track))
         return cls(
             one, scene, waveform, tuple(track), receivers, replace(options, receiver=None, out=None), options.out
@@ -125,5 +127,5 @@ class EchoesOfTracks:
     def _echoes(self, i: int, files: TrackFiles | None) -> PhaseHistory:
         if files is None:
             return self.plan_of(i).run()
-        finished = files.finished(files.files[i])
+        finished = None if self.options.resume is False else files.finished(files.files[i])
         return self.plan_of(i, files.files[i]).run() if finished is None else finished
