@@ -8,7 +8,7 @@
 // an edge is covered is tested at the distance `slack` beside it, so that shadows that touch have no border between them, and of
 // equal borders that of the larger shadow counts: neither order nor chains of corners are needed.
 //
-// source    docs/theory/shadows.md; phase integral of a triangle: sarcl/scattering/physical_optics.py:triangle_mean
+// source    docs/theory/shadows.md; phase integral of a triangle as a divided difference, as in sarcl/scattering/physical_optics.py:triangle_mean
 // symbols   rho       from the facet's centroid, which is the origin of its axes x, y in the plane and z along its normal, m
 //           slack     m, distance beside an edge; on_plane  m, distance below which a corner lies in the facet's plane
 //           receiver  see receiver_axes.clh
@@ -21,7 +21,7 @@
 
 #include "receiver_axes.clh"
 
-enum { SHADOW = 15, COVERS = 255, SLIVER = 300 };
+enum { SHADOW = 15, COVERS = 255, SLIVER = 300, COVERED_PARTS = 16 };
 
 typedef struct { double x, y; } point;
 
@@ -157,28 +157,55 @@ static inline int crosses(__global const double *corner, int n, point a, point b
     return low < high;
 }
 
-static inline double sinc(double x) { return fabs(x) < 1e-3 ? 1.0 - x * x / 6.0 : sin(x) / x; }
-
-// Integral of exp(j phase)/(2 area) over a triangle whose corners have the phases 0, b and c, rad.
-static inline void triangle_integral(double b, double c, double *re, double *im) {
-    double zero = 0, low = min(b, c), high = max(b, c), x = min(low, zero), z = max(high, zero), y = max(low, min(high, zero));
-    double u = 0.5 * (z - y), v = 0.5 * (y - x), w = u + v, su = sinc(u), sv = sinc(v), quotient;
-    if (w < 0.5) {  // (sinc u - sinc v)/(u + v) in powers of u and v: no digits are lost
-        double uu = u * u, vv = v * v, series = 0, h = 0, power = 1, factorial = 1, sign = 1;
-        for (int m = 1; m < 8; m++) {
-            h = power + uu * h;
-            power *= vv;
-            factorial *= 2 * m * (2 * m + 1);
-            sign = -sign;
-            series += sign / factorial * h;
-        }
-        quotient = (u - v) * series;
+// Take the part of an edge from `from` to `to`, covered by a shadow: s moves to its end where it holds s, and it is listed
+// where it begins later. Where there is no room, the part that begins last is left out, and `known` falls to its begin.
+static inline void put_part(double *begins, double *stops, int *n, double *known, double *s, double from, double to) {
+    int at = *n;
+    if (to <= *s || from >= *known) return;
+    if (from <= *s) {
+        *s = to;
+        return;
+    }
+    if (at == COVERED_PARTS) {
+        at = 0;
+        for (int i = 1; i < COVERED_PARTS; i++)
+            if (begins[i] > begins[at]) at = i;
+        *known = min(*known, max(from, begins[at]));
+        if (from >= begins[at]) return;
     } else
-        quotient = (su - sv) / w;
-    double real = 0.5 * sinc(0.5 * w) * (su + sv), imaginary = -cos(0.5 * w) * quotient;
-    double turn = (v - u) / 6.0 + (b + c) / 3.0, s = sin(turn), t = cos(turn);
-    *re = 0.5 * (real * t - imaginary * s);
-    *im = 0.5 * (real * s + imaginary * t);
+        *n = at + 1;
+    begins[at] = from;
+    stops[at] = to;
+}
+
+enum { CLOSE_INVERSE = 10000, SMALL_INVERSE = 100 };  // 1/rad: below these differences, and phases, series hold to 1e-10
+
+// Integral of exp(j x t) over t from 0 to 1: exp(j x/2) sinc(x/2).
+static inline point line_integral(double x) {
+    double middle = 0.5 * x, sine = sin(middle), mean = fabs(middle) < 1e-3 ? 1.0 - middle * middle / 6.0 : sine / middle;
+    point out = {cos(middle) * mean, sine * mean};
+    return out;
+}
+
+// Integral of exp(j phase)/(2 area) over a triangle whose corners have the phases 0, b and c, rad: the divided difference of
+// exp(j x) at these, (E(c) - E(b))/(j (c - b)), with E the integral over a line. For b near c it is the derivative of E/j at
+// their mean m, (exp(j m) - E(m))/(j m), and for small phases a series in m.
+static inline point triangle_integral(double b, double c) {
+    double apart = c - b, m = 0.5 * (b + c);
+    point out;
+    if (fabs(apart) * CLOSE_INVERSE > 1) {
+        point first = line_integral(b), second = line_integral(c);
+        out.x = (second.y - first.y) / apart;
+        out.y = (first.x - second.x) / apart;
+    } else if (fabs(m) * SMALL_INVERSE > 1) {
+        point line = line_integral(m);
+        out.x = (sin(m) - line.y) / m;
+        out.y = (line.x - cos(m)) / m;
+    } else {
+        out.x = 0.5 - m * m / 8.0;
+        out.y = m / 3.0 - m * m * m / 30.0;
+    }
+    return out;
 }
 
 typedef struct { int n_pairs; } lit_parts_numbers;
@@ -229,47 +256,47 @@ __kernel void lit_parts(lit_parts_numbers given, __global const double *restrict
                 if (e >= 0 && !crosses(r + 12, 3, a, lit, d, &s, &end)) continue;
                 double low_x = min(a.x, a.x + d.x) - r[19], high_x = max(a.x, a.x + d.x) + r[19];
                 double low_y = min(a.y, a.y + d.y) - r[19], high_y = max(a.y, a.y + d.y) + r[19];
-                while (s < end) {  // from s on to the end of the shadows there, and then to the begin of the next one
-                    double until = end;
-                    int moved = 1;
-                    while (moved && s < end) {
-                        moved = 0;
-                        until = end;
-                        for (int e_2 = 0; e_2 < ENDS; e_2++)
-                            for (int k = begin; k < stop; k++) {
-                                size_t other = (pulse * ENDS + e_2) * given.n_pairs + k;
-                                if (corners[other] == 0 || (e >= 0 && other == own)) continue;
-                                __global const double *shadow = shadows + SHADOW * other;
-                                if (shadow[0] > high_x || shadow[1] < low_x || shadow[2] > high_y || shadow[3] < low_y) continue;
-                                double from, to;
-                                int covered = crosses(shadow + 4, corners[other], a, lit, d, &from, &to);
-                                if (covered && from <= s && to > s) {
-                                    s = to;
+                while (s < end) {  // up to `known`, all parts of the edge that shadows cover are listed
+                    double begins[COVERED_PARTS], stops[COVERED_PARTS], known = end;
+                    int parts = 0;
+                    for (int e_2 = 0; e_2 < ENDS; e_2++)
+                        for (int k = begin; k < stop; k++) {
+                            size_t other = (pulse * ENDS + e_2) * given.n_pairs + k;
+                            if (corners[other] == 0 || (e >= 0 && other == own)) continue;
+                            __global const double *shadow = shadows + SHADOW * other;
+                            if (shadow[0] > high_x || shadow[1] < low_x || shadow[2] > high_y || shadow[3] < low_y) continue;
+                            double from, to;
+                            if (crosses(shadow + 4, corners[other], a, lit, d, &from, &to))
+                                put_part(begins, stops, &parts, &known, &s, from, to);
+                            if (e >= 0 && (shadow[14] > own_area || (shadow[14] == own_area && other < own)) &&
+                                crosses(shadow + 4, corners[other], a, left, d, &from, &to))
+                                put_part(begins, stops, &parts, &known, &s, from, to);
+                        }
+                    while (s < known) {  // from s on to the end of the shadows there, and then to the begin of the next one
+                        double until = known;
+                        int moved = 1;
+                        while (moved && s < known) {
+                            moved = 0;
+                            until = known;
+                            for (int i = 0; i < parts; i++)
+                                if (begins[i] <= s && stops[i] > s) {
+                                    s = stops[i];
                                     moved = 1;
-                                } else if (covered && from > s)
-                                    until = min(until, from);
-                                if (e >= 0 && (shadow[14] > own_area || (shadow[14] == own_area && other < own)) &&
-                                    crosses(shadow + 4, corners[other], a, left, d, &from, &to)) {
-                                    if (from <= s && to > s) {
-                                        s = to;
-                                        moved = 1;
-                                    } else if (from > s)
-                                        until = min(until, from);
-                                }
-                            }
-                    }
-                    if (s >= end) break;
-                    double ax = a.x + s * d.x, ay = a.y + s * d.y, bx = a.x + until * d.x, by = a.y + until * d.y;
-                    double twice = (e < 0 ? 1.0 : -1.0) * crossed(ax, ay, bx, by);
-                    area += 0.5 * twice;
+                                } else if (begins[i] > s)
+                                    until = min(until, begins[i]);
+                        }
+                        if (s >= known) break;
+                        double ax = a.x + s * d.x, ay = a.y + s * d.y, bx = a.x + until * d.x, by = a.y + until * d.y;
+                        double twice = (e < 0 ? 1.0 : -1.0) * crossed(ax, ay, bx, by);
+                        area += 0.5 * twice;
 #pragma unroll
-                    for (int m = 0; m < WAVES; m++) {
-                        double re, im;
-                        triangle_integral(waves[m] * (qx * ax + qy * ay), waves[m] * (qx * bx + qy * by), &re, &im);
-                        sums[2 * m] += twice * re;
-                        sums[2 * m + 1] += twice * im;
+                        for (int m = 0; m < WAVES; m++) {
+                            point part = triangle_integral(waves[m] * (qx * ax + qy * ay), waves[m] * (qx * bx + qy * by));
+                            sums[2 * m] += twice * part.x;
+                            sums[2 * m + 1] += twice * part.y;
+                        }
+                        s = until;
                     }
-                    s = until;
                 }
             }
         }

@@ -20,7 +20,7 @@ import textwrap
 import typing
 from collections import defaultdict
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from importlib.util import resolve_name
 from pathlib import Path
@@ -52,7 +52,10 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Verb:
-    """A verb as its files need it; what it returns as it is written in `module`."""
+    """A verb as its files need it; what it returns as it is written in `module`.
+
+    lists  names of parameters that may be lists of as many: a list of results is returned then
+    """
 
     name: str
     doc: str
@@ -60,6 +63,7 @@ class Verb:
     result: str
     subjects: tuple[Parameter, ...]
     options: tuple[Parameter, ...]
+    lists: tuple[str, ...] = ()
 
     @property
     def title(self) -> str:
@@ -92,7 +96,7 @@ def read(name: str) -> Verb:
         if p.kind is p.POSITIONAL_OR_KEYWORD
     ]
     doc, result = inspect.getdoc(verb) or "", str(signature.return_annotation)
-    return Verb(name, doc, verb.__module__, result, tuple(subjects), tuple(options_of(verb.options)))
+    return Verb(name, doc, verb.__module__, result, tuple(subjects), tuple(options_of(verb.options)), verb.lists)
 
 
 def options_of(record: Any) -> list[Parameter]:
@@ -251,15 +255,32 @@ def stub(entries: list[Verb]) -> str:
 
 
 def _functions(entry: Verb, names: Names) -> list[str]:
-    """Signature of a verb: two where it may return None."""
+    """Signatures of a verb: a second where it may return None, and one more where it takes lists."""
     doc = _docstring(f"{entry.about} Options: docs/guide/options.md.")
-    result = names.type(entry.result, entry.module)
-    if PIECE not in [p.name for p in entry.options]:
-        return [_function(entry.name, _parameters(entry, names), result, doc)]
-    whole = _parameters(entry, names, f"    {PIECE}: None = None,\n")
-    piece = _parameters(entry, names, "    {name}: {type},\n")
-    overloads = _function(entry.name, whole, result, doc), _function(entry.name, piece, f"{result} | None", doc)
-    return [f"@overload\n{text}" for text in overloads]
+    result, takes_pieces = names.type(entry.result, entry.module), PIECE in [p.name for p in entry.options]
+    whole = f"    {PIECE}: None = None,\n"
+    texts = [_function(entry.name, _parameters(entry, names, whole), result, doc)]
+    if takes_pieces:
+        piece = _parameters(entry, names, "    {name}: {type},\n")
+        texts.append(_function(entry.name, piece, f"{result} | None", doc))
+    if entry.lists:
+        texts.append(_function(entry.name, _parameters(_of_lists(entry), names, whole), f"list[{result}]", doc))
+    return texts if len(texts) == 1 else [f"@overload\n{text}" for text in texts]
+
+
+def _of_lists(entry: Verb) -> Verb:
+    """A verb with lists in place of the parameters that may be lists."""
+
+    def of_list(p: Parameter) -> Parameter:
+        alone = p.type.removesuffix(" | None")
+        return (
+            replace(p, type=p.type.replace(alone, f"list[{alone}] | tuple[{alone}, ...]", 1))
+            if p.name in entry.lists
+            else p
+        )
+
+    parts = {name: tuple(map(of_list, getattr(entry, name))) for name in ("subjects", "options")}
+    return replace(entry, **parts)
 
 
 def _parameters(entry: Verb, names: Names, piece: str = "    {name}: {type} = {default},\n") -> str:

@@ -67,6 +67,7 @@ class ToleranceMissed(ValueError):
 
     tolerance, measured  relative errors; measured is NaN where values of the result are not finite numbers
     image, raw           the finished Image or PhaseHistory, the other is None
+    raws                 of a list of tracks the finished PhaseHistories of all
     predicted            relative error that the error formulas predicted, None: unknown
     instead              what to do where a smaller tolerance may not help
     """
@@ -94,6 +95,7 @@ class ToleranceMissed(ValueError):
         advice = ", and ".join([*filter(None, remedies), "please report it"])
         super().__init__(f"tolerance {tolerance:.1e} was missed, {measured:.1e} measured: {cause}; {advice} ({kept})")
         self.tolerance, self.measured, self.image, self.raw = tolerance, measured, image, raw
+        self.raws: list[PhaseHistory] = []
 
 
 def confirm_tolerance(*, image: Image | None = None, raw: PhaseHistory | None = None, instead: str = "") -> None:

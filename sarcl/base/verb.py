@@ -30,10 +30,12 @@ class Verb(Protocol[R_co]):
     """A verb: called it returns its result.
 
     planned  called in the same way, returns its Plan;  options  its record
+    lists    names of the subject, and of options, that may be lists of as many: a list of results is returned then
     """
 
     __name__: str
     options: type[Options]
+    lists: tuple[str, ...]
 
     @property
     def planned(self) -> Callable[..., Plan[R_co]]:
@@ -43,8 +45,14 @@ class Verb(Protocol[R_co]):
         """The result of the plan for these arguments."""
 
 
-def verb(record: type[Options]) -> Callable[[Callable[..., Plan[R]]], Verb[R]]:
-    """Decorator that makes a verb, with the options of `record`, of the function that plans it."""
+def verb(
+    record: type[Options], lists: tuple[str, ...] = (), plan_list: Callable[..., Plan[object]] | None = None
+) -> Callable[[Callable[..., Plan[R]]], Verb[R]]:
+    """Decorator that makes a verb, with the options of `record`, of the function that plans it.
+
+    lists      a subject that may be a list, and options that are lists of as many then
+    plan_list  plan_list(plan, *subjects, options) plans such a list
+    """
 
     def made(plan: Callable[..., Plan[R]]) -> Verb[R]:
         signature = inspect.signature(plan)
@@ -58,13 +66,16 @@ def verb(record: type[Options]) -> Callable[[Callable[..., Plan[R]]], Verb[R]]:
                 if name not in known and name not in names:
                     raise TypeError(f"{plan.__name__} has {unknown(name, known, 'option')}")
             own = {name: given.pop(name) for name in names if name in given}
-            return plan(*args, **own, options=record(**given))
+            options = record(**given)
+            if plan_list and isinstance((dict(zip(names, args, strict=False)) | own).get(lists[0]), (list, tuple)):
+                return plan_list(plan, *args, **own, options=options)  # type: ignore[return-value]  # as the stub says
+            return plan(*args, **own, options=options)
 
         @functools.wraps(plan)
         def function(*args: object, **given: object) -> R:
             return function.planned(*args, **given).run()  # type: ignore[attr-defined]
 
-        function.planned, function.options = planned, record  # type: ignore[attr-defined]
+        function.planned, function.options, function.lists = planned, record, lists  # type: ignore[attr-defined]
         function.__signature__ = signature.replace(  # type: ignore[attr-defined]
             parameters=[*subjects, *_keywords(record)], return_annotation=result_of(signature.return_annotation)
         )

@@ -9,6 +9,7 @@ The unit "contribution" is one row at one pixel, or one scatterer in one row, wi
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
@@ -215,6 +216,7 @@ def shared_lines(
     return (pair + tile / side**2 + SHARED_TURN / group) / GATHERED
 
 
+@functools.lru_cache(maxsize=4096)
 def profile(length: int) -> float:
     """Contributions per range profile of `length` samples: half of one per sample and doubling for the FFT.
 

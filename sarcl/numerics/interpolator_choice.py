@@ -48,6 +48,18 @@ def _candidates(n_samples: int, carrier: float) -> tuple[tuple[int, float, int],
     return tuple(out)
 
 
+@functools.lru_cache(maxsize=1024)
+def _by_cost(
+    n_samples: int, pairs_per_row: float, carrier: float, gathering: cost_model.Gathering
+) -> tuple[tuple[float, int, float, int], ...]:
+    """Cost, taps, oversampling and profile length of every interpolator, the cheapest first."""
+    candidates = [
+        (pairs_per_row * gathering.of_taps(taps, oversample) + cost_model.profile(length), taps, oversample, length)
+        for taps, oversample, length in _candidates(n_samples, carrier)
+    ]
+    return tuple(sorted(candidates, key=lambda candidate: candidate[0]))
+
+
 @functools.lru_cache(maxsize=256)
 def least_error(n_samples: int, carrier: float = 0.0) -> float:
     """The smallest error that `choose_interpolator` can meet, for rows of n_samples."""
@@ -78,19 +90,15 @@ def choose_interpolator(
     ToleranceUnreachable names the smallest error that can be met.
     """
 
-    def cost(candidate: tuple[int, float, int]) -> float:
-        taps, oversample, length = candidate
-        return pairs_per_row * gathering.of_taps(taps, oversample) + cost_model.profile(length)
-
     families = [(interpolation.lower_bound, interpolation.interpolator)]
     if gathering.fitted:
         families.insert(0, (interpolation.fitted_lower_bound, interpolation.fitted))
-    for taps, oversample, length in sorted(_candidates(n_samples, carrier), key=cost):
+    for cost, taps, oversample, length in _by_cost(n_samples, pairs_per_row, carrier, gathering):
         for least_of, make in families:
             if least_of(taps, oversample) <= error:
                 made = make(taps, oversample)
                 if made.error <= error:
-                    return made, length, cost((taps, oversample, length)) / pairs_per_row
+                    return made, length, cost / pairs_per_row
     least = rounded_up(least_error(n_samples, carrier))
     raise ToleranceUnreachable(error, least, "interpolation of float32 range profiles")
 

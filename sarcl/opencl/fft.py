@@ -1,4 +1,5 @@
-"""One FFT of rows: reikna on GPUs, scipy.fft on CPU devices (measured: reikna is 3 to 20 times slower there)."""
+"""One FFT of rows: reikna on GPUs; on CPU devices scipy.fft, where reikna is 3 to 20 times slower, and of few rows
+numpy.fft."""
 
 from __future__ import annotations
 
@@ -24,34 +25,41 @@ if TYPE_CHECKING:
 # Multiplications with additions, at the speed of a device's trial, in whose time a launch takes a sample on: an FFT
 # waits for memory, so this is many times what it computes. Launches that take longer make the next batches smaller.
 SAMPLE = 200.0
+# Bytes of rows up to which numpy.fft transforms them on the host. It takes three times scipy's time for complex64, at
+# most 10 ms here, but importing scipy.fft takes 300 ms. NumPy 1 would compute complex64 in complex128.
+SMALL = 2**22 if np.lib.NumpyVersion(np.__version__) >= "2.0.0" else 0
 
 _turns = threading.Lock()  # a plan's kernels get their arguments before they are enqueued: one thread at a time
 _slow: dict[Device, float] = {}  # samples of a batch whose launches last LASTS, of devices whose launches lasted longer
 
 
+@functools.lru_cache(maxsize=4096)
 def good_length(n: int) -> int:
-    """Smallest length >= n whose FFT is fast (factors 2, 3, 5 and 7)."""
-    import scipy.fft
-
-    return int(scipy.fft.next_fast_len(n))
+    """Smallest length >= n whose FFT is fast (factors 2, 3, 5, 7 and 11)."""
+    odd = [1]
+    for factor in (3, 5, 7, 11):
+        powers = [factor**k for k in range(n.bit_length())]
+        odd = [one * power for one in odd for power in powers if one * power < 2 * n]
+    return min(one << (-(-n // one) - 1).bit_length() for one in odd)
 
 
 def rows(device: Device | None, data: np.ndarray, *, inverse: bool = False, engine: str | None = None) -> np.ndarray:
     """FFT of every row of complex (n, m) `data`, not normalised in either direction; the type is kept.
 
     device  None: on the host
-    engine  "reikna" or "scipy"; default by the kind of device. complex128 goes to reikna only where rows are a power of
-            two long: for other lengths the error is 1e-16 times the length (measured: 9e-12 at 98 304)
+    engine  "reikna" or "scipy"; default by the kind of device, and numpy.fft for few rows. complex128 goes to reikna
+            only where rows are a power of two long: for other lengths the error is 1e-16 times the length (measured:
+            9e-12 at 98 304)
     """
-    if device is None:
-        engine = "scipy"
-    elif engine is None:
-        engine = "reikna" if on_device(device, data.shape[1], data.dtype) else "scipy"
+    if engine is None and device is not None and on_device(device, data.shape[1], data.dtype):
+        engine = "reikna"
     if device is not None and engine == "reikna":
         return _reikna(device, data, inverse)
+    # norm="forward" puts the 1/m on the other direction: neither call divides
+    if data.nbytes <= SMALL and engine is None:
+        return np.fft.ifft(data, axis=1, norm="forward") if inverse else np.fft.fft(data, axis=1)
     import scipy.fft
 
-    # norm="forward" puts the 1/m on the other direction: neither call divides
     if inverse:
         return scipy.fft.ifft(data, axis=1, norm="forward", workers=threads())
     return scipy.fft.fft(data, axis=1, workers=threads())

@@ -18,7 +18,7 @@ import numpy as np
 
 from ..base.boxes import box
 from ..base.rows import spread_over
-from ..base.vectors import unit
+from ..base.vectors import cross, unit
 from ..numerics.pulse_geometry import PulseGeometry
 from ..scene.triangles import areas, bisect, centroids, edges
 from ._facet_sampling import drawn
@@ -106,7 +106,7 @@ class DirectionError:
         """Angle by which H and V turn about the line of sight from an antenna, from places to others, rad (n,)."""
         look, up = unit(places - end), np.array(self._vertical)
         one, two = (_level(p - end, self._vertical) for p in (places, others))
-        return np.asarray(np.arctan2(np.cross(one, two) @ up, (one * two).sum(axis=1)) * (look @ up))
+        return np.asarray(np.arctan2(cross(one, two) @ up, (one * two).sum(axis=1)) * (look @ up))
 
     def _graded(self, triangles: np.ndarray, ends: Ends, edge: float) -> tuple[np.ndarray, np.ndarray]:
         """Facets cut down to `edge` on the vertical through an antenna, to their distance from it elsewhere, and which

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..base.constants import SPEED_OF_LIGHT
+from ..base.fingerprint import checksum
 from ..base.vectors import unit
 from ..scene.scene import Scene
 from ..scene.triangles import areas, bisect, centroids, cut, edges
@@ -64,8 +65,10 @@ class FacetNorm:
 
     def __init__(self, scene: Scene, mirror: np.ndarray, ends: Sequence[Ends], center: float, bandwidth: float) -> None:
         """mirror  True for coherent facets (k,);  ends  antennas at some pulses;  center, bandwidth  Hz"""
-        self._ends = ends
-        group, self._weight = _sampled_planes(scene, np.flatnonzero(mirror))
+        self._ends, self._kept, self._mirror = ends, scene.kept, checksum(mirror)
+        group, self._weight = self._kept.of(
+            ("sampled planes", self._mirror), lambda: _sampled_planes(scene, np.flatnonzero(mirror))
+        )
         self._triangles = scene.triangles[np.concatenate(group)] if group else np.zeros((0, 3, 3))
         self._group = np.repeat(np.arange(len(group)), [len(g) for g in group])
         self._length = np.maximum.reduce(edges(self._triangles)) if group else np.zeros(0)
@@ -114,7 +117,9 @@ class FacetNorm:
         triangles = self._triangles[some]
         n = len(triangles)
         each = -(-PIECES // n)
-        pieces = random_pieces(np.repeat(triangles, each, axis=0), edge)
+        pieces = self._kept.of(  # `some` follows from the edge
+            ("random pieces", self._mirror, edge), lambda: random_pieces(np.repeat(triangles, each, axis=0), edge)
+        )
         share = np.repeat(areas(triangles), each) / (each * areas(pieces))  # pieces that each represents
         powers, places = np.zeros(n), centroids(pieces)
         planes = np.repeat(self._group[some], each)

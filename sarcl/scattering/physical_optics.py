@@ -24,7 +24,7 @@ import math
 import numpy as np
 
 from ..base.constants import EDGE_ON
-from ..base.vectors import unit
+from ..base.vectors import cross, unit
 
 UP = (0.0, 0.0, 1.0)
 
@@ -74,9 +74,9 @@ def triangle_integral(triangles: np.ndarray, q: np.ndarray) -> np.ndarray:
 
 def normals_and_areas(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Unit normals (k, 3), right-handed about the vertices, and areas, m^2 (k,); a facet without area has normal 0."""
-    cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    twice = np.linalg.norm(cross, axis=1)
-    return cross / np.where(twice > 0, twice, 1)[:, None], twice / 2
+    across = cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    twice = np.linalg.norm(across, axis=1)
+    return across / np.where(twice > 0, twice, 1)[:, None], twice / 2
 
 
 def fresnel(cosine: np.ndarray, permittivity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -100,11 +100,12 @@ def polarisation(sight: np.ndarray, up: tuple[float, float, float] = UP) -> tupl
     Along `up` (|s x up| < 1e-6) h takes y for up, or x where up is y.
     """
     s = np.asarray(sight, float)
-    other = np.array([0.0, 1.0, 0.0] if abs(up[1]) < 0.9 else [1.0, 0.0, 0.0])
-    h = np.cross(s, np.asarray(up, float))
-    h = np.where(np.linalg.norm(h, axis=-1, keepdims=True) < 1e-6, np.cross(s, other), h)
+    h = cross(s, np.asarray(up, float))
+    is_along = np.linalg.norm(h, axis=-1, keepdims=True) < 1e-6
+    if is_along.any():
+        h = np.where(is_along, cross(s, np.array([0.0, 1.0, 0.0] if abs(up[1]) < 0.9 else [1.0, 0.0, 0.0])), h)
     h = unit(h)
-    return h, np.cross(h, s)
+    return h, cross(h, s)
 
 
 def lit_share(normal: np.ndarray, to_tx: np.ndarray, to_rx: np.ndarray) -> np.ndarray:
@@ -167,11 +168,13 @@ def scattering_parts(
     k = -u
     cosine = (n * u).sum(axis=-1)
     lit = lit_share(n, u, r)
-    across = np.cross(k, n)
+    across = cross(k, n)
     length = np.linalg.norm(across, axis=-1, keepdims=True)
     # at normal incidence any tangent does: R_v = -R_h there
-    t = np.where(length < 1e-8, polarisation(k)[0], across / np.where(length > 0, length, 1))
-    d, nt = np.cross(k, t), np.cross(n, t)
+    t, is_normal = across / np.where(length > 0, length, 1), length < 1e-8
+    if is_normal.any():
+        t = np.where(is_normal, polarisation(k)[0], t)
+    d, nt = cross(k, t), cross(n, t)
     h, v = polarisation(-r, up)
     turned = -v, h  # e_r x k_s
     out = np.empty((3, *lit.shape, 2, 2))

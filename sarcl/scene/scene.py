@@ -17,6 +17,7 @@ from ..base.boxes import box
 from ..base.errors import warn
 from . import terrain
 from . import triangles as geometry
+from ._kept import Kept
 from .material import FacetMaterials, Material, MaterialLike, checked_table, merge, resolve
 
 if TYPE_CHECKING:
@@ -390,6 +391,14 @@ class Scene:
         seed = validation.count("seed", seed, 0)
         if not self.has_random_points:
             return self
+        return self.kept.of(("realized", seed), lambda: self._realized(seed))
+
+    @cached_property
+    def kept(self) -> Kept:
+        """Results that follow from the scene alone, which calls of the verbs share; for the library's own use."""
+        return Kept()
+
+    def _realized(self, seed: int) -> Scene:
         from ..base.counter_rng import gaussian
 
         random = gaussian(self.triangles.reshape(-1, 3), seed, POINT_HEIGHTS).reshape(-1, 3, 1)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..base import validation
-from ..base.vectors import dot
+from ..base.vectors import cross, dot
 
 MOST_TURN = 1e12  # rad, of a rotation: float64 resolves 1e-4 rad there
 BLOCK = 2**13  # triangles that are looked at together: so few stay in the processor's cache
@@ -138,7 +138,7 @@ def shortest_edges(triangles: np.ndarray) -> np.ndarray:
 
 def distances(triangles: np.ndarray, point: np.ndarray) -> np.ndarray:
     """Distance of each triangle (k, 3, 3) from a point (3,), m (k,)."""
-    ahead, normal = triangles - point, np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    ahead, normal = triangles - point, cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     squared = dot(normal, normal)
     nearest = np.full(len(triangles), np.inf)
     inside = np.ones(len(triangles), bool)
@@ -148,7 +148,7 @@ def distances(triangles: np.ndarray, point: np.ndarray) -> np.ndarray:
         part = np.clip(-dot(a, along) / np.maximum(dot(along, along), 1e-300), 0, 1)[:, None]
         foot = a + part * along
         nearest = np.minimum(nearest, dot(foot, foot))
-        inside &= dot(np.cross(a, b), normal) >= 0  # the foot of the perpendicular is on the inner side of this edge
+        inside &= dot(cross(a, b), normal) >= 0  # the foot of the perpendicular is on the inner side of this edge
     height = dot(ahead[:, 0], normal) ** 2 / np.maximum(squared, 1e-300)
     return np.sqrt(np.where(inside & (squared > 0), height, nearest))
 

@@ -20,6 +20,7 @@ For other folders:
     factorized/        scatterers spread about small cells at few antenna positions, and cells joined level by level
     points/            echoes of points, directly or factorised
     spectral/          spectral_echo(): echoes of straight tracks by Fourier transforms
+    tracks/            echoes of several tracks over one scene
 
 For this folder alone:
 

@@ -13,15 +13,17 @@ from ._echo_plan import EchoPlan
 from .echo_options import EchoOptions
 from .echo_task import echo_task
 from .track_options import Polarization as Polarization
+from .tracks.echoes_of_tracks import EchoesOfTracks
 
 
-@verb(EchoOptions)
+@verb(EchoOptions, ("track", "receiver"), EchoesOfTracks.of)
 def echo(scene: Scene, waveform: Waveform, track: Trajectory, options: EchoOptions) -> Plan[PhaseHistory]:
     """Echoes s_p(f) = sum_k a_k(p) W(f) exp(-j 2 pi f (tau_k(p) - tau_ref(p))) of every pulse, compressed.
 
     scene         points (|amplitude|^2 = RCS, m^2) and facets: physical optics with the materials' Fresnel
                   coefficients, the exact phase of the wave over every facet, single scattering (docs/theory/facets.md)
-    track         transmitter
+    track         transmitter; or a list of tracks: a list of phase histories is returned, each with the samples of a
+                  call of its own. `receiver` is a list of as many then, and `out` a folder, with a file for each track
     {options}
 
     Antennas rest while a pulse is on its way (stop and go), except on tracks of `Orbit.trajectory`: there the receiver

@@ -19,6 +19,8 @@ from . import echo_sampling
 from .echo_options import EchoOptions
 from .echo_request import EchoRequest
 
+KEPT = 1 / 16  # of the memory for blocks, for results that a scene keeps for the next call
+
 
 @dataclass(frozen=True, eq=False)
 class EchoTask:
@@ -55,6 +57,7 @@ def echo_task(scene: Scene, waveform: Waveform, track: Trajectory, options: Echo
     check_subjects(scene, waveform, track)
     devices = _devices(options)
     request = replace(EchoRequest.of(options, scene, devices[0]), method=options.method)
+    scene.kept.limit(KEPT * request.budget)
     point = scene.center if options.reference is None else np.asarray(options.reference)
     sends, hears, motion = echo_sampling.in_flight(track, options.receiver, scene, point)
     echo_sampling.receiver_positions(sends, hears)

@@ -231,6 +231,41 @@ def echo(
     """Echoes s_p(f) = sum_k a_k(p) W(f) exp(-j 2 pi f (tau_k(p) - tau_ref(p))) of every pulse, compressed. Options:
     docs/guide/options.md."""
 
+@overload
+def echo(
+    scene: Scene,
+    waveform: Waveform,
+    track: list[Trajectory] | tuple[Trajectory, ...],
+    *,
+    method: Literal["auto", "direct", "factorized"] = "auto",
+    channels: Literal["simultaneous", "separated"] = "simultaneous",
+    receive: Literal["reference", "own", "all"] = "reference",
+    skip: bool | Collection[EchoSkip] = True,
+    array: AntennaArray | None = None,
+    antenna: Antenna | tuple[Antenna, Antenna] | None = None,
+    radar: Radar | None = None,
+    shadows: bool = True,
+    seed: int = 0,
+    max_edge: float | Literal["auto"] | None = "auto",
+    max_bytes: float | None = None,
+    check: bool | None = None,
+    receiver: list[Trajectory] | tuple[Trajectory, ...] | None = None,
+    polarization: Polarization | Literal["all"] | Sequence[Polarization] = "HH",
+    vertical: ArrayLike | None = None,
+    range_window: ArrayLike | None = None,
+    reference: ArrayLike | None = None,
+    compressed: bool = True,
+    out: PathLike | None = None,
+    resume: bool | None = None,
+    tile: None = None,
+    device: DeviceChoice | None = None,
+    cluster: distributed.Client | None = None,
+    tolerance: float = 0.001,
+    progress: Progress | None = None,
+) -> list[PhaseHistory]:
+    """Echoes s_p(f) = sum_k a_k(p) W(f) exp(-j 2 pi f (tau_k(p) - tau_ref(p))) of every pulse, compressed. Options:
+    docs/guide/options.md."""
+
 def spectral_echo(
     scene: Scene,
     waveform: Waveform,

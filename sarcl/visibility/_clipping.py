@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..base.vectors import unit
+from ..base.vectors import cross, unit
 from ..opencl.device import Device
 from ..opencl.launch_numbers import launch_numbers
 from ..scene.triangles import areas, centroids, edges, normals
@@ -17,11 +17,12 @@ from ._shadow_pairs import PAIRS_AT_ONCE
 KERNELS = "lit_parts.cl"
 SHADOW = 15  # numbers of a shadow, as in the kernels
 # Wavenumbers per launch, on CPUs and on other devices: GPUs keep the sums of no more in registers
-MOST_WAVES = 4, 1
+MOST_WAVES = 8, 1
 # Distance beside an edge at which the kernels look whether it is covered, relative to the facet's longest edge: above
 # what rounding moves corners by
 SLACK = 1e-12
-FEW_PAIRS = 64  # that are clipped at every pulse: launches take longer than they would save
+# Pairs, and pulses, of which so few are clipped at every pulse: sorting shadows out takes longer than it saves
+FEW_PAIRS, FEW_PULSES = 64, 2
 # Pulses for which shadows that miss a facet, or cover it, are sorted out at once: of all facets, then of the rest
 TOGETHER = 64, 16
 
@@ -48,7 +49,7 @@ class Receivers:
         """Facets `which` as the kernels read them, about `origin` (n, RECEIVER)."""
         triangles, center, normal = self.triangles[which], self.center[which], self.normal[which]
         along = unit(triangles[:, 1] - triangles[:, 0])
-        across = np.cross(normal, along)
+        across = cross(normal, along)
         flat = np.stack(
             [((triangles - center[:, None]) * axis[:, None]).sum(axis=2) for axis in (along, across)], axis=2
         )
@@ -83,7 +84,7 @@ class Clipper:
         """
         if not len(antennas) or not len(which):
             return
-        if len(pairs) < FEW_PAIRS:
+        if len(pairs) < FEW_PAIRS or len(antennas) <= FEW_PULSES:
             clipped = np.flatnonzero(np.isin(which, pairs[:, 0]) | (len(waves) > 0))
             for pulses, part, share, mean in self._in_parts(receivers, which[clipped], pairs, antennas, waves):
                 yield pulses, clipped[part], share, mean

@@ -111,6 +111,10 @@ def _overlapping(
     inside = np.flatnonzero(((receivers[1] >= least) & (receivers[0] <= most)).all(axis=1))
     if not len(inside):
         return
+    if len(inside) * len(occluders[0]) <= PAIRS_AT_ONCE:
+        one, other = np.nonzero(_overlap_of_all(*receivers, *occluders, inside))
+        yield np.stack([inside[one], other], axis=1)
+        return
     size = np.quantile(occluders[1] - occluders[0], 0.75, axis=0) + np.median(receivers[1] - receivers[0], axis=0)
     size = np.maximum(size, (most - least) / 1024)
     size = np.where(size > 0, size, 1.0)
@@ -145,6 +149,17 @@ def _overlapping(
         overlap &= place[:, 0] * wide + place[:, 1] == cell[here]
         yield np.stack([one[overlap], other[overlap]], axis=1)
         first = last
+
+
+def _overlap_of_all(
+    low: np.ndarray, high: np.ndarray, least: np.ndarray, most: np.ndarray, inside: np.ndarray
+) -> np.ndarray:
+    """Whether boxes `inside`, from low to high, overlap each other box, from least to most, bool (m, n)."""
+    apart = [
+        (low[inside, axis, None] > most[None, :, axis]) | (high[inside, axis, None] < least[None, :, axis])
+        for axis in range(2)
+    ]
+    return ~(apart[0] | apart[1])
 
 
 def _cells(

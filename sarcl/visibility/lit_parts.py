@@ -16,7 +16,7 @@ from ..opencl.device import Device
 from ..scene.triangles import areas
 from ._aspect_blocks import pulse_blocks, shadow_length
 from ._certain_shadows import MISSED
-from ._clipping import Clipper, Receivers
+from ._clipping import TOGETHER, Clipper, Receivers
 from ._shadow_pairs import candidate_pairs
 
 # Corners nearer to a facet's plane than this, relative to the scene's diagonal, lie in it: sheets that coincide, or
@@ -25,7 +25,7 @@ ON_PLANE = 1e-6
 # Of few facets among many occluders, those that count are found first for pulses that turn by up to WIDE, rad: where
 # there are FEW times as many occluders at least, and up to so many pairs
 WIDE, FEW, MOST_PAIRS = 0.1, 16, 2**24
-MOST_TURN = 0.25  # of the usual occluder's width, by which shadows may move within a block of pulses
+MOST_TURN = 1.0  # of the usual occluder's width, by which shadows may move within a block of pulses
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +76,12 @@ class FacetPieces:
         """Facets that are not cut, all of them wanted."""
         k = len(triangles)
         return cls(triangles, two_sided, np.ones(k, bool), triangles, np.arange(k))
+
+
+def _largest(values: np.ndarray) -> np.ndarray:
+    """Largest of three values at the corners of each facet (n, 3): numpy takes ten times as long along so short an
+    axis."""
+    return np.maximum(np.maximum(values[:, 0], values[:, 1]), values[:, 2])
 
 
 class LitParts:
@@ -203,6 +209,7 @@ class LitParts:
     def _pairs(self, r: Receivers, span: _Span, some: np.ndarray) -> np.ndarray:
         """Pairs of a receiver and an occluder, of `some`, that may cast a shadow on it from pulses of a span."""
         antennas, solid = span.at, self._occluders[some]
+        about = solid - self._origin
         away = min(float(np.linalg.norm(at - np.clip(at, *self._bounds))) for at in antennas)
         turn = min(span.turn + 1e-6 + (2 * self._margin / away if away else 2.0) * (self._margin > 0), 2.0)
         cosines = [dot(r.normal, unit(at - r.center)) for at in antennas]
@@ -211,7 +218,7 @@ class LitParts:
         away_by = 2 * turn + (2 * EDGE_ON if len(antennas) == 2 else 0.0)
         front = np.all([c > -away_by for c in cosines], axis=0)
         back = r.two_sided & np.all([c < away_by for c in cosines], axis=0)
-        seen = np.flatnonzero(front | back)
+        seen, level = np.flatnonzero(front | back), dot(r.normal, r.center - self._origin)
 
         def found(at: np.ndarray) -> np.ndarray:
             ahead = at - r.center
@@ -225,13 +232,17 @@ class LitParts:
 
             def casts(pairs: np.ndarray) -> np.ndarray:
                 which = seen[pairs[:, 0]]
-                places = solid[pairs[:, 1]] - r.center[which, None]
-                heights = (places * r.normal[which, None]).sum(axis=2)
-                above, below = heights.max(axis=1) > self._on_plane, heights.min(axis=1) < -self._on_plane
-                furthest = np.sqrt((places**2).sum(axis=2).max(axis=1)) + radius[which]
-                ahead = (places * look[which, None]).sum(axis=2).max(axis=1) - nearest[which]
+                heights = np.einsum("ncj,nj->nc", about[pairs[:, 1]], r.normal[which]) - level[which, None]
+                above, below = _largest(heights) > self._on_plane, -_largest(-heights) < -self._on_plane
+                shading = np.flatnonzero((front[which] & above) | (back[which] & below))
+                which, casters = which[shading], pairs[shading, 1]
+                places = solid[casters] - r.center[which, None]
+                furthest = np.sqrt(_largest(np.einsum("ncj,ncj->nc", places, places))) + radius[which]
+                ahead = _largest(np.einsum("ncj,nj->nc", places, look[which])) - nearest[which]
                 ahead += furthest * astray[which]  # no shadow falls towards the antenna
-                return np.asarray(((front[which] & above) | (back[which] & below)) & (ahead > 0))
+                casting = np.zeros(len(pairs), bool)
+                casting[shading[ahead > 0]] = True
+                return casting
 
             return candidate_pairs(r.triangles[seen], solid, at, turn, span.reach, casts)
 
@@ -254,8 +265,10 @@ class LitParts:
             here = slice(max(block.span.first - first, 0), min(block.span.stop - first, n))
             if here.start < here.stop:
                 antennas = np.stack([end[here] - self._origin for end in ends], axis=1)
+                # the pairs of a span have been sorted out for all of its pulses
+                together = TOGETHER if block.span.stop - block.span.first > TOGETHER[0] else TOGETHER[1:]
                 for pulses, some, part_share, part_mean in self._clipper.light(
-                    self._pieces, self._rows, self._pairs_of(block), antennas, waves
+                    self._pieces, self._rows, self._pairs_of(block), antennas, waves, together
                 ):
                     share[here][pulses, some] = part_share
                     mean[here][pulses, some] = part_mean

@@ -96,10 +96,22 @@ def test_a_default_that_is_no_literal_is_refused(write, monkeypatch):
 
 @pytest.mark.parametrize("name", verbs.HOMES)
 def test_the_signature_of_the_stub_is_that_of_the_verb(name):
-    """Where it has two signatures, the first is for results that are whole, the second says what a piece is."""
+    """Where it has several signatures, the first is for results that are whole, one says what a piece is, and the last
+    is for lists."""
     wanted, (whole, *others) = verb_signature(getattr(verbs, name)), stub()[1][name]
     assert whole.return_annotation == wanted.return_annotation
     parameters = dict(whole.parameters)
+    if lists := getattr(verbs, name).lists:
+        of_lists = others.pop()
+        assert of_lists.return_annotation == list[whole.return_annotation]
+        changed = {n: p.annotation for n, p in of_lists.parameters.items() if p != parameters[n]}
+        assert tuple(changed) == lists
+        for n, kind in changed.items():
+            one = typing.get_args(kind)[0]
+            assert typing.get_origin(one) is list and typing.get_args(one)[0] in (
+                parameters[n].annotation,
+                *typing.get_args(parameters[n].annotation),
+            )
     for piece in others:
         assert piece.return_annotation == whole.return_annotation | None
         assert list(piece.parameters) == list(parameters)
@@ -113,7 +125,8 @@ def test_the_signature_of_the_stub_is_that_of_the_verb(name):
 def test_keywords_of_the_stub_are_the_options_of_the_verb(name):
     names, signatures = stub()
     keywords = typing.get_type_hints(names[f"{name.title().replace('_', '')}Keywords"], names)
-    options = {p.name: p.annotation for p in signatures[name][-1].parameters.values() if p.kind is p.KEYWORD_ONLY}
+    *_, signature = (one for one in signatures[name] if typing.get_origin(one.return_annotation) is not list)
+    options = {p.name: p.annotation for p in signature.parameters.values() if p.kind is p.KEYWORD_ONLY}
     assert keywords == options
 
 

@@ -198,8 +198,8 @@ def test_the_marker_and_the_shared_types_come_with_the_package():
 
 
 MISTAKES = """
-sarcl.echo(scene, chirp, track, polarization="HX")  # Argument "polarization" to "echo"
-sarcl.echo(scene, chirp, track, skip={"beams"})  # Literal['beams']
+sarcl.echo(scene, chirp, track, polarization="HX")  # No overload variant of "echo"
+sarcl.echo(scene, chirp, track, skip={"beams"})  # No overload variant of "echo"
 sarcl.backproject(raw, grid, windo="hamming")  # Unexpected keyword argument "windo"
 sarcl.backproject(raw, grid, window="haming")  # Argument "window" to "backproject"
 sarcl.backproject(raw, grid, out=3)  # No overload variant of "backproject"
@@ -208,9 +208,10 @@ sarcl.PhaseHistory(object(), frequency=1e9, frequency_step=1e6, tx=[(0, 0, 0)], 
 sarcl.PhaseHistory([[1j]], frequency=object(), frequency_step=1e6, tx=[(0, 0, 0)], reference_range=1.0)  # "frequency"
 sarcl.Scene.points([(0, 0, 0)], amplitude=1.0)  # Unexpected keyword argument "amplitude"
 sarcl.shapes.box((1, 1, 1), rough=0.1)  # Unexpected keyword argument "rough"
-sarcl.echo(scene, chirp, track, tolerence=1e-3)  # Unexpected keyword argument "tolerence"
-sarcl.plan(sarcl.echo, scene, chirp, track, tolerence=1e-3)  # Unexpected keyword argument "tolerence"
-sarcl.plan(sarcl.echo, scene, chirp, track, tolerance="fine")  # expected "float"
+sarcl.echo(scene, chirp, [track], receiver=track)  # No overload variant of "echo"
+sarcl.echo(scene, chirp, track, tolerence=1e-3)  # No overload variant of "echo"
+sarcl.plan(sarcl.echo, scene, chirp, track, tolerence=1e-3)  # incompatible type overloaded function
+sarcl.plan(sarcl.echo, scene, chirp, track, tolerance="fine")  # incompatible type overloaded function
 sarcl.plan(sarcl.echo, scene, chirp)  # No overload variant of "plan"
 sarcl.plan(sarcl.backproject, raw, grid, windo="hamming")  # incompatible type overloaded function
 sarcl.plan(raw, grid, windo="hamming")  # No overload variant of "plan"
@@ -250,6 +251,8 @@ sarcl.Scenario(waveform=chirp, scene=scene, grid={"plane": {"shape": [64, 64], "
 REVEALED = """
 reveal_type(sarcl.echo(scene, chirp, track, tolerance=1e-3))  # PhaseHistory
 reveal_type(sarcl.plan(sarcl.echo, scene, chirp, track, tolerance=1e-3))  # Forecast[PhaseHistory]
+reveal_type(sarcl.echo(scene, chirp, [track, track], receiver=[track, track]))  # list[PhaseHistory]
+reveal_type(sarcl.plan(sarcl.echo, scene, chirp, [track, track], tolerance=1e-3))  # Forecast[list[PhaseHistory]]
 reveal_type(sarcl.plan(sarcl.fullwave_echo, scene, waveform=chirp, track=track))  # Forecast[PhaseHistory]
 reveal_type(sarcl.plan(sarcl.backproject, raw, grid, tolerance=1e-3))  # Forecast[Image]
 reveal_type(sarcl.plan(sarcl.range_doppler, raw, side="left").run())  # Image

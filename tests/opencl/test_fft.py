@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -54,3 +55,21 @@ def test_a_launch_that_lasts_long_makes_the_next_batches_smaller(device, monkeyp
     assert np.linalg.norm(made - np.fft.fft(data)) <= 1e-6 * np.linalg.norm(made)
     assert planned == [(16, 64), *5 * [(5, 64)]]
     assert fft.rows_at_once(gpu, 64) == 5 and fft.rows_at_once(gpu, 128) == 2
+
+
+def test_good_lengths_have_small_factors_and_are_the_least():
+    powers = itertools.product(*(factor ** np.arange(14) for factor in (2, 3, 5, 7, 11)))
+    lengths = np.unique([int(np.prod(each)) for each in powers if np.prod(np.array(each, float)) < 1e4])
+    for n in (*range(1, 2000), 2049, 4001):
+        assert fft.good_length(n) == lengths[np.searchsorted(lengths, n)]
+
+
+@pytest.mark.parametrize("dtype", [np.complex64, np.complex128])
+@pytest.mark.parametrize("inverse", [False, True])
+def test_few_rows_and_many_are_transformed_alike(dtype, inverse):
+    """numpy.fft and scipy.fft."""
+    data = noise(40, 99).astype(dtype)
+    few = fft.rows(None, data, inverse=inverse)
+    many = fft.rows(None, data, inverse=inverse, engine="scipy")
+    assert few.dtype == many.dtype == dtype
+    assert np.linalg.norm(few - many) <= (4e-7 if dtype == np.complex64 else 1e-15) * np.linalg.norm(many)

@@ -9,6 +9,7 @@ from helpers.lit_cases import lit_polygon
 import sarcl
 from sarcl.reference.lit_part import lit_part
 from sarcl.scene.triangles import normals
+from sarcl.visibility import _shadow_pairs
 from sarcl.visibility._shadow_pairs import candidate_pairs
 from sarcl.visibility.lit_parts import FacetPieces, LitParts
 
@@ -235,3 +236,45 @@ def test_nothing_is_seen_from_within_a_closed_body_in_a_room(device, seed):
     facets = np.concatenate([room.triangles[:, ::-1], body.triangles])
     found = shares(device, facets, facets, [inside[None]], two_sided=False)[0]
     assert (found[((inside - facets[:, 0]) * normals(facets)).sum(axis=1) > 0] == 0).all()
+
+
+@pytest.mark.parametrize("reach", [0.0, 0.5])
+def test_pairs_of_many_facets_are_found_by_a_grid_as_by_all_pairs(reach, monkeypatch):
+    random = np.random.default_rng(2)
+    receivers, occluders = (
+        random.uniform(-5, 5, (90, 1, 3)) + random.standard_normal((90, 3, 3)) * size for size in (0.05, 0.3)
+    )
+    antenna = np.array([1.0, 0.5, -0.3]) if reach else np.array([200.0, 50.0, 90.0])
+
+    def found():
+        return candidate_pairs(receivers, occluders, antenna, 0.02, reach, lambda p: np.ones(len(p), bool))
+
+    of_all = found()
+    monkeypatch.setattr(_shadow_pairs, "PAIRS_AT_ONCE", 64)
+    assert 50 < len(of_all) < 4000 and np.array_equal(found(), of_all)
+
+
+def test_an_edge_under_more_shadows_than_are_listed_at_once(device):
+    """A comb of 40 strips over a facet; the strips are given in the order of a shuffle, and some overlap."""
+    random = np.random.default_rng(4)
+    starts = np.linspace(-0.05, 1.0, 40) + random.uniform(0, 0.01, 40)
+    strips = [[[x, -1, 0.2], [x + 0.02, -1, 0.2], [x, 3, 0.2]] for x in starts.tolist()]
+    occluders = random.permutation(np.array(strips, float))
+    ends = [np.array([[0.3, 0.4, 50.0], [0.2, 0.4, 50.0]])]
+    parts = lit_parts(device, FACET, occluders, ends)
+    share, mean = parts.at(0, ends, WAVES)
+    for pulse in range(2):
+        wanted, integral = lit_part(FACET[0], occluders, [ends[0][pulse]], WAVES, parts.on_plane)
+        assert share[pulse, 0] == pytest.approx(wanted, abs=TOLERANCE)
+        np.testing.assert_allclose(mean[pulse, 0], integral, atol=TOLERANCE)
+
+
+def test_phase_integrals_of_small_and_of_nearly_equal_phases(device):
+    """A shadow far smaller than a wave, and lines along which the phase hardly changes: the series of the kernel."""
+    occluder = np.array([[[0.1, 0.2, 0.5], [0.7, 0.2, 0.5], [0.2, 0.9, 0.5]]])
+    for antenna in ([0.0, 0.0, 1e6], [1.0, 0.0, 1e6], [3e5, 1.0, 1e6], [1e2, 3e5, 1e6]):
+        ends = [np.array([antenna])]
+        parts = lit_parts(device, FACET, occluder, ends)
+        waves = np.array([1e-6, 1e-3, 0.05, 300.0])
+        wanted = lit_part(FACET[0], occluder, [ends[0][0]], waves, parts.on_plane)[1]
+        np.testing.assert_allclose(parts.at(0, ends, waves)[1][0, 0], wanted, atol=TOLERANCE)

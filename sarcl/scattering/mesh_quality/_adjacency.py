@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base import boxes
-from ...base.vectors import dot
+from ...base.vectors import cross, dot
 from ...scene.triangles import areas, solid
 
 SAME_PLACE = 1e-8  # of a mesh's size: corners closer than this are the same
@@ -39,7 +39,7 @@ class MeshAdjacency:
 def adjacency_of(triangles: np.ndarray) -> MeshAdjacency:
     """Adjacency of triangles, m (k, 3, 3). Edges of one facet alone, or of more than two, join none."""
     corner, places = _welded(triangles)
-    normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    normal = cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     twice = np.sqrt(dot(normal, normal))
     normal /= np.where(twice > 0, twice, 1)[:, None]
     start, end = corner.ravel(), np.roll(corner, -1, axis=1).ravel()
@@ -56,12 +56,20 @@ def adjacency_of(triangles: np.ndarray) -> MeshAdjacency:
 
 
 def components(n: int, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """The number of the component each of n nodes is in (n,), a and b linked; numbered in the order of the nodes."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
+    """The number of the component each of n nodes is in (n,), a and b linked; numbered in the order of the nodes.
 
-    links = coo_array((np.ones(len(a), np.int8), (a, b)), shape=(n, n))
-    return np.asarray(connected_components(links, directed=False)[1])
+    Links join the roots of trees, the larger number to the smaller; then every node goes to its root.
+    """
+    root = np.arange(n)
+    while len(a):
+        low = np.minimum(root[a], root[b])
+        for ends in (a, b):
+            np.minimum.at(root, root[ends], low)
+        while not np.array_equal(nearer := root[root], root):
+            root = nearer
+        apart = root[a] != root[b]
+        a, b = a[apart], b[apart]
+    return np.asarray(np.unique(root, return_inverse=True)[1])
 
 
 def uncut(triangles: np.ndarray, j: MeshAdjacency, kind: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
@@ -95,7 +103,7 @@ def uncut(triangles: np.ndarray, j: MeshAdjacency, kind: np.ndarray) -> tuple[np
     middle = np.stack([np.bincount(its, p, n) for p in points.T], axis=1) / np.maximum(count, 1)[:, None]
     across = triangles[stands, 1] - triangles[stands, 0]
     away = points - middle[its]
-    turned = dot(away, np.cross(normal, across[its]))
+    turned = dot(away, cross(normal, across[its]))
     order = np.lexsort((np.arctan2(turned, dot(away, across[its])), its))
     points, its = points[order], its[order]
     first = np.cumsum(count) - count

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
-from ...base.vectors import dot
+from ...base.vectors import cross, dot
 from ...numerics.pulse_geometry import PulseGeometry
 from ...scene.material import Material
 from ...scene.scene import Scene
@@ -107,7 +107,7 @@ def _facets(
 ) -> _Facets:
     """Facets `some` of b seen from direction u (n, 3), on the side their normals point to or on the other (-1)."""
     edge, area, normal = b.edge[some], b.area[some], b.normal[some]
-    across = np.cross(u, normal) * (b.turn[some] / (2 * area))[:, None]
+    across = cross(u, normal) * (b.turn[some] / (2 * area))[:, None]
     slope = np.einsum("kij,kj->ki", np.roll(edge, -1, axis=1), across)
     phase = np.einsum("kij,kj->ki", edge, u) * q[:, None]
     return _Facets(phase, side * b.height[some], slope, side * dot(normal, u), facing, area, q)
