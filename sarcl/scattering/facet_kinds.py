@@ -45,12 +45,12 @@ class FacetView:
 
 def coherent(scene: Scene) -> np.ndarray:
     """Facets (k,) that have a coherent part, reflected as by a mirror of their size."""
-    return np.array([np.isfinite(m.height) for m in scene.materials])[scene.material]
+    return np.array([np.isfinite(m.height) for m in scene.materials], bool)[scene.material]
 
 
 def rough(scene: Scene) -> np.ndarray:
     """Facets (k,) that have an incoherent part."""
-    return np.array([m.diagram not in COHERENT and m.height > 0 for m in scene.materials])[scene.material]
+    return np.array([m.diagram not in COHERENT and m.height > 0 for m in scene.materials], bool)[scene.material]
 
 
 def random(scene: Scene) -> np.ndarray:

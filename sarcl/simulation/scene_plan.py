@@ -139,7 +139,7 @@ def plan_scene(
         center, bandwidth = seen.waveform.center, seen.waveform.bandwidth
         view = FacetView(scene, antennas, center, bandwidth, request.polarizations, request.vertical)
         limits = {"max_bytes": request.host, "profiles": profiles, "terms": terms}
-        subdivision = plan_cut(share, view, weight_error, seen.waveform, max_edge, **limits)
+        subdivision = plan_cut(share, view, weight_error, seen.waveform, max_edge, request.device, **limits)
         room = share / subdivision.gain - subdivision.plan.predicted_error
         if not subdivision.plan.is_float64:  # pieces are not counted yet
             _profiles_fit(bands, room, len(scene.triangles) * MOST_FACETS, share / subdivision.gain)
