@@ -83,7 +83,8 @@ class CutLimits:
 
     finest     longest edge of a coherent facet, m;  cell  edges, m, of facets with random parts
     cuts       False: facets stay as they are
-    max_bytes  that the cut facets may take; twice the facets of the scene are allowed whatever it is
+    on_device  facets (k,) bool that a device cuts, in blocks: their pieces take no memory of the host
+    max_bytes  that the other cut facets may take; twice the facets of the scene are allowed whatever it is
     profiles   least error of the range profiles that cut facets are spread into
     terms      pulses times samples: with few of them and few facets, sums may be in float64; inf: never
     """
@@ -91,6 +92,7 @@ class CutLimits:
     finest: float
     cell: float
     cuts: bool
+    on_device: np.ndarray
     max_bytes: float
     profiles: float
     terms: float
@@ -119,14 +121,13 @@ class _PlanSearch:
     best   cheapest plan with sums in float32 so far;  exact  that with the fewest facets and sums in float64
     least, least_rounding  best tolerances so far, and those that float32 alone would allow
     turn   error of one H and V per facet at the last edge;  interpolates  whether an edge was short enough but for the
-           interpolation over the band
+           interpolation over the band;  fits  whether the host holds the pieces of the last edge
     """
 
     def __init__(self, tolerance: float, view: FacetView, weights: WeightError, limits: CutLimits) -> None:
         self.tolerance, self.view, self.weights, self.limits = tolerance, view, weights, limits
         scene, mirror = view.scene, view.mirror
         self.in_memory = max(2.0 * len(scene.triangles), limits.max_bytes / FACET_BYTES)
-        self.most = min(float(MOST_FACETS), self.in_memory)
         self.longest = np.maximum.reduce(edges(scene.triangles))
         self.top = float(self.longest[mirror].max(initial=0.0)) or float(self.longest.max())
         self.distance = nearest(scene, view.antennas, box(scene.triangles.reshape(-1, 3)))
@@ -138,14 +139,18 @@ class _PlanSearch:
         self.best: FacetPlan | None = None
         self.exact: FacetPlan | None = None
         self.cost = self.least = self.least_rounding = np.inf
-        self.turn, self.interpolates = 0.0, False
+        self.turn, self.interpolates, self.fits = 0.0, False, True
 
     def proceeds_beyond(self, edge: float) -> bool:
         """Consider facets cut to `edge`, m. Whether shorter edges may allow a cheaper plan."""
         mirror, limits = self.view.mirror, self.limits
         sizes = self.longest / np.where(mirror, edge, min(limits.cell, 1e30))
-        count = float(np.maximum(1.0, PIECES * sizes**2).sum())
-        if count > self.most or (self.exact is not None and count > WORTH_FLOAT32 * self.exact.n_facets):
+        pieces = np.maximum(1.0, PIECES * sizes**2)
+        count = float(pieces.sum())
+        self.fits = float(pieces[~limits.on_device].sum()) <= self.in_memory
+        if not self.fits or count > MOST_FACETS:
+            return False
+        if self.exact is not None and count > WORTH_FLOAT32 * self.exact.n_facets:
             return False
         is_small = count * limits.terms <= FLOAT64_TERMS and self.cross_ratio <= DARK
         rounding = self._rounding(edge) + self.weights.rounding
@@ -217,8 +222,9 @@ class _PlanSearch:
             return ToleranceUnreachable(tolerance, reach, limit, remedy, how=how)
         if tolerance <= self.least_rounding < np.inf:  # inf: even the largest pieces are too many
             return ToleranceUnreachable(tolerance, reach, float32, how="with facets in float32")
-        how, remedy = f"without cutting these facets into more than {self.most:,.0f}", "take a smaller scene"
-        if self.in_memory < MOST_FACETS:
+        most, remedy = MOST_FACETS if self.fits else self.in_memory, "take a smaller scene"
+        how = f"without cutting these facets into more than {most:,.0f}"
+        if most < MOST_FACETS:
             memory = size_text(self.limits.max_bytes)
             how += f" (about {FACET_BYTES} bytes per facet of max_bytes, {memory})"
             remedy += ", a track farther away, or a larger max_bytes"

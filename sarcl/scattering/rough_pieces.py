@@ -8,6 +8,7 @@ source   docs/theory/facets.md; kernels/facet_pieces.cl
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -28,6 +29,9 @@ from .facets import FacetSet
 from .random_surface import RANDOM_STREAMS, ROUND, with_facets
 
 KERNELS = "facet_pieces.cl"
+# Pieces that are on a device together: some 200 MB of them, beside as many that are being made
+BLOCK = 2**21
+PIECE_BYTES = 84  # bytes of a piece on the device: offsets, edges, reflectivity, random numbers
 # of edges of what a work-item cuts, over those of pieces: some hundred pieces each, of which a path has a dozen cuts
 COARSE = 16
 FARTHEST = 1e9  # m, of corners: millionths of a metre of random numbers are counted exactly up to twice that
@@ -107,10 +111,25 @@ class RoughPieces:
         index = np.flatnonzero(given[self.of])
         return self if len(index) == len(self.of) else self.rows(index)
 
-    def rows(self, index: np.ndarray) -> RoughPieces:
+    def rows(self, index: np.ndarray | slice) -> RoughPieces:
         """All pieces of facets `index` of these, in this order."""
         parts = {name: getattr(self, name)[index] for name in ("facets", "lengths", "of", "counts")}
         return replace(self, **parts, some=None)
+
+    def blocks(self) -> Iterator[tuple[slice, RoughPieces]]:
+        """The pieces in parts of about BLOCK, all of each facet in one: numbers of the pieces, and these."""
+        ends, first = np.cumsum(self.counts, dtype=np.int64), 0
+        while first < len(ends):
+            begin = int(ends[first] - self.counts[first])
+            stop = int(np.searchsorted(ends, begin + BLOCK)) + 1
+            last = int(ends[min(stop, len(ends)) - 1])
+            part, here = self.rows(slice(first, stop)), slice(begin, last)
+            if self.some is not None:
+                here = slice(*np.searchsorted(self.some, [begin, last]).tolist())
+                part = replace(part, some=self.some[here] - begin)
+            if here.start < here.stop:
+                yield here, part
+            first = stop
 
     def picked(self, some: np.ndarray) -> RoughPieces:
         """Pieces of these numbers, rising, alone."""
@@ -142,7 +161,7 @@ class RoughPieces:
         float32 (., stride).
 
         surfaces  (n, n_kinds): what pieces of a kind share, as place_pieces of the kernels reads it
-        kinds     of the scene's facets (k,)
+        kinds     of these facets (k,)
         """
         device, has_heights = self.device, bool(self.scene.roughness.any())
         facets, owners, paths = self._listed()
@@ -155,7 +174,7 @@ class RoughPieces:
         )  # fmt: skip
         device.run(
             device.kernel(KERNELS, "place_pieces"), (stride // device.info.vector_width,), None, numbers,
-            facets, owners, paths, device.upload(kinds[self.of].astype(np.int32)),
+            facets, owners, paths, device.upload(kinds.astype(np.int32)),
             device.upload(surfaces.astype(np.float64)), centers, planes,
         )  # fmt: skip
         return centers, planes
@@ -270,8 +289,9 @@ class RoughFacets(FacetSet):
 
     def tiling_numbers(self, nodes: np.ndarray, metal: bool, dispersive: bool) -> tuple[np.ndarray, np.ndarray]:
         """Arguments `surfaces` and `kinds` of `RoughPieces.placed`."""
-        scene, kinds = self.pieces.scene, facet_kinds.kinds(self.pieces.scene)
-        _, some, kinds = np.unique(kinds, return_index=True, return_inverse=True)
+        scene, of = self.pieces.scene, self.pieces.of
+        _, some, kinds = np.unique(facet_kinds.kinds(scene, of), return_index=True, return_inverse=True)
+        some = of[some]
         alike = FacetSet(
             scene.triangles[some], scene.reflectivity[some], scene.two_sided[some], scene.material[some],
             scene.materials, None, some, np.zeros(len(some), np.complex64),

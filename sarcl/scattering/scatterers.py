@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 
@@ -11,6 +11,7 @@ import numpy as np
 from ..base import boxes
 from ..base.constants import EDGE_ON
 from ..base.errors import warn
+from ..base.text import size_text
 from ..numerics.pulse_geometry import PulseGeometry
 from ..opencl.device import Device
 from ..scene import triangles as geometry
@@ -20,6 +21,7 @@ from ..visibility.illumination import ALL_DARK, Illumination, lit
 from ..visibility.lit_parts import ON_PLANE, FacetPieces, LitParts
 from ..visibility.swept_shadows import never_shaded
 from .facet_kinds import coherent
+from .facet_plan import FACET_BYTES
 from .facets import FacetSet
 from .random_surface import Pieces, with_facets
 from .rough_pieces import RoughFacets, RoughPieces
@@ -69,6 +71,7 @@ class ShadowRule:
     exact    lit parts of coherent facets are computed; False: all shadows are shares, from samples
     sampled, accuracy  shadows on incoherent facets are shares; with this error relative to the norm of these facets
     margin   m: antennas of channels stand up to this far from these;  max_bytes  for lit parts, and for shares
+    host     bytes for pieces on the host
     """
 
     exact: bool
@@ -76,6 +79,15 @@ class ShadowRule:
     accuracy: float
     max_bytes: float
     margin: float = 0.0
+    host: float = np.inf
+
+    def check_room(self, n: int) -> None:
+        """MemoryError for more pieces on which shadows may fall than the host holds."""
+        if n * FACET_BYTES > self.host:
+            raise MemoryError(
+                f"shadows may fall on {n:,} pieces of rough facets, which take {size_text(n * FACET_BYTES)}; max_bytes "
+                f"allows {size_text(self.host)}. Take a smaller scene, a larger max_bytes, or shadows=False"
+            )
 
 
 def facets_of(
@@ -87,8 +99,8 @@ def facets_of(
     device: Device,
     progress: Callable[[str, int, int], object],
 ) -> tuple[tuple[FacetSet, ...], dict[str, int]]:
-    """Facets of a scene, displaced, culled and illuminated: those that a device cuts, and those of the host, in sets
-    that hold any; and counts of pairs left out: reason -> count.
+    """Facets of a scene, displaced, culled and illuminated: those that a device cuts, in blocks, and those of the host,
+    in sets that hold any; and counts of pairs left out: reason -> count.
 
     shadows   None: every facet is seen whole
     progress  called as progress("scene", 2, 3) when facets are culled, progress("shadows", pulses done, pulses) while
@@ -109,9 +121,9 @@ def facets_of(
         illumination = _illumination_of(original, rough, host, antennas, shadows, device, report_shadows)
         if host is not None and host.is_clipped.any():
             lit_parts = _lit_parts_of(host.pieces, host.is_clipped, antennas, shadows, device, report_shadows)
-    sets = ([] if rough is None else [_seen_rough(rough, illumination, culling)]) + (
-        [] if host is None else [host.seen(illumination, 0 if rough is None else len(rough), lit_parts, culling)]
-    )
+    sets: list[FacetSet] = [] if rough is None else list(_seen_rough(rough, illumination, culling))
+    if host is not None:
+        sets.append(host.seen(illumination, 0 if rough is None else len(rough), lit_parts, culling))
     sets = [part for part in sets if len(part)]
     if not sets and lit_parts is not None:
         warn(ALL_DARK)
@@ -119,13 +131,16 @@ def facets_of(
     return tuple(sets), culling.left_out
 
 
-def _seen_rough(pieces: RoughPieces, illumination: Illumination | None, culling: _Culling) -> FacetSet:
-    """The pieces on a device of which an antenna sees something; of these an illumination is the first part."""
-    if illumination is None:
-        return RoughFacets(pieces)
-    seen = np.flatnonzero(~illumination.dark[: len(pieces)])
-    culling.leave_out("shadowed", len(pieces) - len(seen))
-    return RoughFacets(pieces.picked(seen), illumination, seen)
+def _seen_rough(pieces: RoughPieces, illumination: Illumination | None, culling: _Culling) -> Iterator[FacetSet]:
+    """The pieces on a device of which an antenna sees something, in blocks; of these an illumination is the first
+    part."""
+    seen = None
+    if illumination is not None:
+        seen = np.flatnonzero(~illumination.dark[: len(pieces)])
+        culling.leave_out("shadowed", len(pieces) - len(seen))
+        pieces = pieces.picked(seen)
+    for here, part in pieces.blocks():
+        yield RoughFacets(part, illumination, None if seen is None else seen[here])
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,7 +237,9 @@ def _illumination_of(
         is_shaded, power = casters.shade(scene, rough.facets, rough.of, antennas)
         beside += power
         if is_shaded.any():
-            corners, row = rough.rows(np.flatnonzero(is_shaded)).corners()
+            rest = rough.rows(np.flatnonzero(is_shaded))
+            rule.check_room(len(rest))
+            corners, row = rest.corners()
             number = np.flatnonzero(np.repeat(is_shaded, rough.counts))
             parts.append((corners, rough.of[is_shaded][row], number))
     if host is not None and len(rows):

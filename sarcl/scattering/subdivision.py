@@ -27,13 +27,15 @@ from .rough_pieces import RoughFacets, RoughPieces
 class Subdivision:
     """How a scene's facets are cut: coherent ones to the edges of the plan, random ones to about `cell`, m.
 
-    cuts   False: facets stay as they are
-    rough  plan of the facets without a coherent part, where a device cuts them; None: `plan` holds for them
+    cuts    False: facets stay as they are
+    device  that cuts the facets without a coherent part, where it can; None: the host does
+    rough   plan of the facets without a coherent part, where a device cuts them; None: `plan` holds for them
     """
 
     plan: FacetPlan
     cell: float
     cuts: bool
+    device: Device | None = None
     rough: FacetPlan | None = None
 
     @property
@@ -45,20 +47,15 @@ class Subdivision:
         """The plan by which a set of facets is added up."""
         return self.rough if self.rough is not None and isinstance(facets, RoughFacets) else self.plan
 
-    def apply(self, scene: Scene, seed: int, device: Device | None) -> tuple[Subdivision, CutScene]:
-        """The subdivision with the numbers of pieces, and the pieces of the scene; `seed` of its random surface.
-
-        device  that cuts facets, where it can; None: the host does
-        """
+    def apply(self, scene: Scene, seed: int) -> tuple[Subdivision, CutScene]:
+        """The subdivision with the number of pieces, and the pieces of the scene; `seed` of its random surface."""
         rough = host = None
-        on_host = np.ones(len(scene.triangles), bool)
-        if device is not None and not self.plan.is_float64:
-            on_host = ~RoughPieces.suited(device, scene)
-        if device is not None and not on_host.all():
-            rough = RoughPieces.cut(device, scene, self.cell, seed, ~on_host)
-        if on_host.any():
+        on_device = _on(None if self.plan.is_float64 else self.device, scene)
+        if self.device is not None and on_device.any():
+            rough = RoughPieces.cut(self.device, scene, self.cell, seed, on_device)
+        if not on_device.all():
             edge = longest_piece(self.plan.max_edge) if self.cuts else np.inf
-            host = pieces_of(scene, self.cell, edge, seed, on_host)
+            host = pieces_of(scene, self.cell, edge, seed, ~on_device)
         cut = CutScene(scene, rough, host)
         return replace(self, plan=replace(self.plan, n_facets=len(cut))), cut
 
@@ -94,13 +91,13 @@ def plan_cut(
     weights: WeightError,
     waveform: Waveform,
     max_edge: float | str | None,
-    device: Device,
+    device: Device | None,
     **limits: float,
 ) -> Subdivision:
     """How to cut a scene's facets within `share` of a tolerance.
 
     weights  errors of the antenna weights;  max_edge  as `sarcl.echo` takes it
-    device   that may cut rough facets;  limits  max_bytes, profiles and terms of `CutLimits`
+    device   that may cut rough facets, or None;  limits  max_bytes, profiles and terms of `CutLimits`
     ValueError for another max_edge, ToleranceUnreachable where the share cannot be met.
     """
     finest = np.inf
@@ -110,11 +107,16 @@ def plan_cut(
         raise ValueError(f"max_edge is {max_edge!r}; give a length in m, 'auto', or None")
     cell = np.inf if max_edge is None else cell_edge(waveform)
     cuts = max_edge is not None
-    cut_limits = CutLimits(finest=finest, cell=cell, cuts=cuts, **limits)
-    plan, rough = plan_facets(share, view, weights, cut_limits), None
-    rows = np.flatnonzero(RoughPieces.suited(device, view.scene))
-    if 0 < len(rows) < len(view.scene.triangles) and not plan.is_float64:
+    on_device = _on(device, view.scene)
+    cut_limits = CutLimits(finest=finest, cell=cell, cuts=cuts, on_device=on_device, **limits)
+    plan, rough, rows = plan_facets(share, view, weights, cut_limits), None, np.flatnonzero(on_device)
+    if 0 < len(rows) < len(on_device) and not plan.is_float64:
         part = replace(view, scene=with_facets(view.scene, view.scene.triangles[rows], rows))
         with suppress(ToleranceUnreachable):  # beside the others they meet it
-            rough = plan_facets(share, part, weights, replace(cut_limits, terms=np.inf))
-    return Subdivision(plan, cell, cuts, rough)
+            rough = plan_facets(share, part, weights, replace(cut_limits, on_device=on_device[rows], terms=np.inf))
+    return Subdivision(plan, cell, cuts, device, rough)
+
+
+def _on(device: Device | None, scene: Scene) -> np.ndarray:
+    """Facets that a device cuts (k,) bool."""
+    return np.zeros(len(scene.triangles), bool) if device is None else RoughPieces.suited(device, scene)

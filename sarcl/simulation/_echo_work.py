@@ -49,7 +49,8 @@ class EchoWork(NamedTuple):
         request, seen = scene.request, scene.seen
         n_points = len(seen.scene.positions) if request.same else 0
         smooth, rough = pieces_of(scene)
-        on_device = bool(RoughPieces.suited(request.device, seen.scene).any())
+        device = None if scene.subdivision is None else scene.subdivision.device
+        on_device = device is not None and RoughPieces.suited(device, seen.scene).any()
         cut_rough = cost_model.CUT_PIECE_ON_DEVICE if on_device else cost_model.CUT_PIECE
         cutting = cost_model.CUT_PIECE * smooth + cut_rough * rough
         lit, n_pulses = 0.0, len(seen.antennas)

@@ -11,6 +11,7 @@ from ..base.tolerances import askable, rounded_up
 from ..scattering.antenna_weights import AntennaWeights
 from ..scattering.facets import FacetSet
 from ..scattering.mesh_quality import facet_error, speckle_contrast
+from ..scattering.rough_pieces import PIECE_BYTES, RoughFacets
 from ..scattering.scatterers import Points, ShadowRule, facets_of, points_of
 from ..scattering.subdivision import Subdivision
 from ..scene.scene import Scene
@@ -22,6 +23,9 @@ from .scene_plan import SHADOWS, ScenePlan, parts_of, samples_shadows
 
 LEAST = 1e-30  # largest amplitude of a scene below which echoes approach the smallest numbers of complex64
 LARGEST = 1e30  # amplitude whose sums and spectra still fit in complex64
+# Share of the memory for blocks that pieces of rough facets may take on the device; where they take more, they are made
+# anew for each block of pulses
+KEPT_PIECES = 0.5
 # Share of a tolerance for what is left out outside the beam: as little as this, since it may be a specular reflection
 UNSEEN = 1e-3
 
@@ -39,9 +43,7 @@ def prepare_scene(plan: ScenePlan, *, tiled: bool = True, exact: bool = True) ->
     points, skipped = points_of(seen.scene, request.skips, len(seen.antennas))
     facets, subdivision, mesh_warnings = tuple[FacetSet, ...](), plan.subdivision, dict[str, Any]()
     if subdivision is not None:
-        sampled = samples_shadows(request, seen)
-        on_device = tiled and (sampled or not request.shadows)  # lit parts are computed of pieces on the host
-        subdivision, cut = subdivision.apply(seen.scene, request.seed, request.device if on_device else None)
+        subdivision, cut = subdivision.apply(seen.scene, request.seed)
         cells, represents = cut.sampled_cells(speckle_contrast.SAMPLED)
         # curves are recognised in facets as they were given, speckle follows from the facets that are added up
         speckle = speckle_contrast.judge(cells, seen.antennas, seen.waveform, represents)
@@ -49,10 +51,11 @@ def prepare_scene(plan: ScenePlan, *, tiled: bool = True, exact: bool = True) ->
         request.report("scene", 1, 3)
         shadows = ShadowRule(
             exact=exact,
-            sampled=sampled,
+            sampled=samples_shadows(request, seen),
             accuracy=SHADOWS * request.tolerance / parts_of(seen.scene),
             max_bytes=request.budget / 4,
             margin=seen.margin,
+            host=request.host,
         )
         facets, left_out = facets_of(
             cut,
@@ -116,8 +119,10 @@ def _tiled_facets(
     if subdivision is None or subdivision.plan.is_float64:
         return ()
     seen = plan.seen
+    n_rough = sum(len(part) for part in facets if isinstance(part, RoughFacets))
+    stays = PIECE_BYTES * n_rough <= KEPT_PIECES * plan.request.budget
     return tuple(
-        TiledFacets(plan.request, some, subdivision.plan_of(some), seen.antennas, seen.waveform, weights)
+        TiledFacets(plan.request, some, subdivision.plan_of(some), seen.antennas, seen.waveform, weights, stays=stays)
         for part in facets
         for some in part.split()
     )

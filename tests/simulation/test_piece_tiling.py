@@ -23,6 +23,12 @@ def test_tiles_hold_their_pieces(double, per_tile):
     tiling = PieceTiling(pieces, *RoughFacets(pieces).tiling_numbers(np.array([9.6e9]), True, False))
     tiles = tiling.tiles(per_tile)
     assert tiling.tiles(per_tile) is tiles
+    brief = PieceTiling(pieces, *RoughFacets(pieces).tiling_numbers(np.array([9.6e9]), True, False), stays=False)
+    assert brief.radius == tiling.radius and tiles.planes is tiles.planes
+    for one, stays in ((tiles, True), (brief.tiles(per_tile), False)):
+        planes = one.planes
+        one.release()
+        assert (one.planes is planes) == stays
     wanted, order = tile_points(
         geometry.centroids(pieces.corners()[0]), tiling.center, per_tile, np.arange(len(pieces))
     )
