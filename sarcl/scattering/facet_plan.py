@@ -21,7 +21,7 @@ from ..scene.scene import Scene
 from ..scene.triangles import centroids, distances, edges
 from ._cutting_error import CuttingError
 from ._direction_error import DirectionError
-from ._frequency_nodes import cross_polarization_ratio, over_band
+from ._frequency_nodes import OverBand, cross_polarization_ratio
 from .antenna_weights import MOST_NODES, WeightError
 from .facet_kinds import FacetView
 
@@ -121,7 +121,8 @@ class _PlanSearch:
     best   cheapest plan with sums in float32 so far;  exact  that with the fewest facets and sums in float64
     least, least_rounding  best tolerances so far, and those that float32 alone would allow
     turn   error of one H and V per facet at the last edge;  interpolates  whether an edge was short enough but for the
-           interpolation over the band;  fits  whether the host holds the pieces of the last edge
+           interpolation over the band;  rough  pieces of facets without a coherent part, on the host and on a device
+    fits  whether the host holds the pieces of the last edge
     """
 
     def __init__(self, tolerance: float, view: FacetView, weights: WeightError, limits: CutLimits) -> None:
@@ -132,6 +133,11 @@ class _PlanSearch:
         self.top = float(self.longest[mirror].max(initial=0.0)) or float(self.longest.max())
         self.distance = nearest(scene, view.antennas, box(scene.triangles.reshape(-1, 3)))
         self.cross_ratio = cross_polarization_ratio(view, self.top, limits.cell)
+        # where both kinds are there, facets that a device cuts have a plan of their own
+        apart = limits.on_device & mirror.any()
+        self.over_band = OverBand(view, limits.cell, apart)
+        pieces = np.maximum(1.0, PIECES * (self.longest / min(limits.cell, 1e30)) ** 2)
+        self.rough = [float(pieces[~mirror & there].sum()) for there in (~limits.on_device, limits.on_device)]
         self.directions = DirectionError(view)
         self.cutting = CuttingError(view, self.directions.steep)
         is_random = scene.roughness.any() or not mirror.any()
@@ -144,10 +150,9 @@ class _PlanSearch:
     def proceeds_beyond(self, edge: float) -> bool:
         """Consider facets cut to `edge`, m. Whether shorter edges may allow a cheaper plan."""
         mirror, limits = self.view.mirror, self.limits
-        sizes = self.longest / np.where(mirror, edge, min(limits.cell, 1e30))
-        pieces = np.maximum(1.0, PIECES * sizes**2)
-        count = float(pieces.sum())
-        self.fits = float(pieces[~limits.on_device].sum()) <= self.in_memory
+        on_host = self.rough[0] + float(np.maximum(1.0, PIECES * (self.longest[mirror] / edge) ** 2).sum())
+        count = on_host + self.rough[1]
+        self.fits = on_host <= self.in_memory
         if not self.fits or count > MOST_FACETS:
             return False
         if self.exact is not None and count > WORTH_FLOAT32 * self.exact.n_facets:
@@ -191,7 +196,7 @@ class _PlanSearch:
         """Take the cheapest number of frequency nodes whose error, beside a `fixed` one, meets the tolerance."""
         view, weights = self.view, self.weights
         per_node = cost_model.FACET_NODE + 4 * cost_model.FACET_TAP * len(view.polarizations)
-        band = over_band(view, edge, self.limits.cell)
+        band = self.over_band.errors(edge)
         for power, n in ((power, n) for power in band for n in range(1, MOST_NODES + 1)):
             error = fixed + weights.with_phase(n, band[power])
             self.least = min(self.least, self._required(gain, error))

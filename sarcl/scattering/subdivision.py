@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -109,12 +108,14 @@ def plan_cut(
     cuts = max_edge is not None
     on_device = _on(device, view.scene)
     cut_limits = CutLimits(finest=finest, cell=cell, cuts=cuts, on_device=on_device, **limits)
-    plan, rough, rows = plan_facets(share, view, weights, cut_limits), None, np.flatnonzero(on_device)
-    if 0 < len(rows) < len(on_device) and not plan.is_float64:
+    rough, rows = None, np.flatnonzero(on_device)
+    if 0 < len(rows) < len(on_device):
         part = replace(view, scene=with_facets(view.scene, view.scene.triangles[rows], rows))
-        with suppress(ToleranceUnreachable):  # beside the others they meet it
+        try:
             rough = plan_facets(share, part, weights, replace(cut_limits, on_device=on_device[rows], terms=np.inf))
-    return Subdivision(plan, cell, cuts, device, rough)
+        except ToleranceUnreachable:  # beside the others they may meet it
+            cut_limits = replace(cut_limits, on_device=np.zeros(len(on_device), bool))
+    return Subdivision(plan_facets(share, view, weights, cut_limits), cell, cuts, device, rough)
 
 
 def _on(device: Device | None, scene: Scene) -> np.ndarray:
