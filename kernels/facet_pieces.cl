@@ -8,7 +8,8 @@
 //   N_s(x)    standard normal number of position x and stream s (Box and Muller 1958), of two hashes
 //
 // source    longest-edge bisection: Rivara 1984; splitmix64: Steele, Lea and Flood 2014
-// symbols   facets   float64 (n_facets, 3, 3): corners, m;  limit  of edges, m, float64
+// symbols   facets   float64 (n_facets, 12): corners (3, 3), m, and lengths of the edges from each on to the next, m
+//           limit    of edges, m, float64
 //           starts   int (n_facets): number of the first piece of each
 //           n        pieces;  stride  distance of one plane from the next, whole tiles, the last of which the last piece fills
 //           kinds    int (n_facets), and  surfaces  (n_surface, n_kinds) float64: what all pieces of a kind share
@@ -79,18 +80,16 @@ static inline facet chosen_facet(lv is_first, facet f, facet g) {
 
 // Facets of which each lane reads its own.
 static inline facet load_facet(__global const double *restrict facets, const int *row) {
-    double v[9][VW];
+    double v[12][VW];
 #pragma unroll
     for (int l = 0; l < VW; l++)
 #pragma unroll
-        for (int i = 0; i < 9; i++) v[i][l] = facets[9 * (size_t)row[l] + i];
+        for (int i = 0; i < 12; i++) v[i][l] = facets[12 * (size_t)row[l] + i];
     facet f;
     f.a.x = LOAD(0, v[0]), f.a.y = LOAD(0, v[1]), f.a.z = LOAD(0, v[2]);
     f.b.x = LOAD(0, v[3]), f.b.y = LOAD(0, v[4]), f.b.z = LOAD(0, v[5]);
     f.c.x = LOAD(0, v[6]), f.c.y = LOAD(0, v[7]), f.c.z = LOAD(0, v[8]);
-    f.ab = length_of(minus(f.b, f.a));
-    f.bc = length_of(minus(f.c, f.b));
-    f.ca = length_of(minus(f.a, f.c));
+    f.ab = LOAD(0, v[9]), f.bc = LOAD(0, v[10]), f.ca = LOAD(0, v[11]);
     return f;
 }
 

@@ -12,16 +12,17 @@ Facet = tuple[np.ndarray, np.ndarray, np.ndarray]  # corners, m (3,)
 HEIGHTS, REAL, IMAG = 0, 2, 3  # streams of random numbers
 
 
-def pieces(triangles: np.ndarray, limit: float) -> tuple[np.ndarray, np.ndarray]:
+def pieces(triangles: np.ndarray, lengths: np.ndarray, limit: float) -> tuple[np.ndarray, np.ndarray]:
     """Triangles (k, 3, 3) cut until no edge is longer than a limit, m: pieces (n, 3, 3), and the triangle of each (n,).
 
+    lengths  m (k, 3), of the edges from each corner on to the next
     The first half of a triangle, with all its pieces, comes before the second.
     """
     out: list[Facet] = []
     counts = []
-    for a, b, c in triangles:
+    for (a, b, c), sides in zip(triangles, lengths.tolist(), strict=True):
         before = len(out)
-        _cut((a, b, c), (_length(b - a), _length(c - b), _length(a - c)), limit, out)
+        _cut((a, b, c), tuple(sides), limit, out)
         counts.append(len(out) - before)
     return np.array(out).reshape(-1, 3, 3), np.repeat(np.arange(len(triangles)), counts)
 

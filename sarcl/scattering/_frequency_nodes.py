@@ -20,24 +20,35 @@ SAFETY = 2.0  # the errors are estimated from samples
 BRIGHTEST = 0.1  # of sampled facets, left out of the reference power: 96 samples estimate the brightest tenth badly
 
 
-def over_band(view: FacetView, edge: float, finest: float) -> dict[int, list[float]]:
-    """Relative errors of interpolating amplitudes over f^power between n = 1, 2, ... Chebyshev nodes: {power: [n]} for
-    the powers 1 and 0; [0] is not used.
+class OverBand:
+    """Relative errors of interpolating amplitudes over f^power between n = 1, 2, ... Chebyshev nodes.
 
-    Facets are cut to edge, m, those that are no mirrors (k,) to finest. The error is that of the worst of four pulses,
-    in L2 over up to 96 facets: twice the sum of the Chebyshev coefficients from the n-th on. Mirrors are looked at
-    apart: the pieces of a specular one add up in phase, and so do their errors, however many rough facets there are.
+    The error is that of the worst of four pulses, in L2 over up to 96 facets: twice the sum of the Chebyshev
+    coefficients from the n-th on. Mirrors are looked at apart: the pieces of a specular one add up in phase, and so do
+    their errors, however many rough facets there are.
     """
-    out = {power: [np.inf] + [0.0] * MOST_NODES for power in (1, 0)}
-    for which in (view.mirror, ~view.mirror):
-        if which.any():
-            part = _sample(view, edge, finest, which)
-            for pulses in (PULSES, 16 * PULSES):  # more pulses where these see nothing
-                sampled = _errors(part, view, pulses)
-                if sampled is not None:
-                    out = {power: np.maximum(errors, sampled[power]).tolist() for power, errors in out.items()}
-                    break
-    return out
+
+    def __init__(self, view: FacetView, finest: float, apart: np.ndarray) -> None:
+        """finest  m, edges to which facets are cut that are no mirrors;  apart  those (k,) bool that do not count"""
+        self.view, self.finest, rough = view, finest, ~view.mirror & ~apart
+        self._rough = self._sampled(finest, rough) if rough.any() else {}
+
+    def errors(self, edge: float) -> dict[int, list[float]]:
+        """Errors where mirrors are cut to `edge`, m: {power: [n]} for the powers 1 and 0; [0] is not used."""
+        out = {power: [np.inf] + [0.0] * MOST_NODES for power in (1, 0)}
+        mirrors = self._sampled(edge, self.view.mirror) if self.view.mirror.any() else {}
+        for part in (mirrors, self._rough):
+            out |= {power: np.maximum(out[power], errors).tolist() for power, errors in part.items()}
+        return out
+
+    def _sampled(self, edge: float, which: np.ndarray) -> dict[int, list[float]]:
+        """Errors of facets `which` (k,) cut to an edge, m; {} where no pulse sees any."""
+        part = _sample(self.view, edge, self.finest, which)
+        for pulses in (PULSES, 16 * PULSES):  # more pulses where these see nothing
+            sampled = _errors(part, self.view, pulses)
+            if sampled is not None:
+                return sampled
+        return {}
 
 
 def cross_polarization_ratio(view: FacetView, edge: float, finest: float) -> float:

@@ -21,7 +21,7 @@ from ..scene.scene import Scene
 from ..scene.triangles import centroids, distances, edges
 from ._cutting_error import CuttingError
 from ._direction_error import DirectionError
-from ._frequency_nodes import cross_polarization_ratio, over_band
+from ._frequency_nodes import OverBand, cross_polarization_ratio
 from .antenna_weights import MOST_NODES, WeightError
 from .facet_kinds import FacetView
 
@@ -83,7 +83,8 @@ class CutLimits:
 
     finest     longest edge of a coherent facet, m;  cell  edges, m, of facets with random parts
     cuts       False: facets stay as they are
-    max_bytes  that the cut facets may take; twice the facets of the scene are allowed whatever it is
+    on_device  facets (k,) bool that a device cuts, in blocks: their pieces take no memory of the host
+    max_bytes  that the other cut facets may take; twice the facets of the scene are allowed whatever it is
     profiles   least error of the range profiles that cut facets are spread into
     terms      pulses times samples: with few of them and few facets, sums may be in float64; inf: never
     """
@@ -91,6 +92,7 @@ class CutLimits:
     finest: float
     cell: float
     cuts: bool
+    on_device: np.ndarray
     max_bytes: float
     profiles: float
     terms: float
@@ -119,18 +121,23 @@ class _PlanSearch:
     best   cheapest plan with sums in float32 so far;  exact  that with the fewest facets and sums in float64
     least, least_rounding  best tolerances so far, and those that float32 alone would allow
     turn   error of one H and V per facet at the last edge;  interpolates  whether an edge was short enough but for the
-           interpolation over the band
+           interpolation over the band;  rough  pieces of facets without a coherent part, on the host and on a device
+    fits  whether the host holds the pieces of the last edge
     """
 
     def __init__(self, tolerance: float, view: FacetView, weights: WeightError, limits: CutLimits) -> None:
         self.tolerance, self.view, self.weights, self.limits = tolerance, view, weights, limits
         scene, mirror = view.scene, view.mirror
         self.in_memory = max(2.0 * len(scene.triangles), limits.max_bytes / FACET_BYTES)
-        self.most = min(float(MOST_FACETS), self.in_memory)
         self.longest = np.maximum.reduce(edges(scene.triangles))
         self.top = float(self.longest[mirror].max(initial=0.0)) or float(self.longest.max())
         self.distance = nearest(scene, view.antennas, box(scene.triangles.reshape(-1, 3)))
         self.cross_ratio = cross_polarization_ratio(view, self.top, limits.cell)
+        # where both kinds are there, facets that a device cuts have a plan of their own
+        apart = limits.on_device & mirror.any()
+        self.over_band = OverBand(view, limits.cell, apart)
+        pieces = np.maximum(1.0, PIECES * (self.longest / min(limits.cell, 1e30)) ** 2)
+        self.rough = [float(pieces[~mirror & there].sum()) for there in (~limits.on_device, limits.on_device)]
         self.directions = DirectionError(view)
         self.cutting = CuttingError(view, self.directions.steep)
         is_random = scene.roughness.any() or not mirror.any()
@@ -138,14 +145,17 @@ class _PlanSearch:
         self.best: FacetPlan | None = None
         self.exact: FacetPlan | None = None
         self.cost = self.least = self.least_rounding = np.inf
-        self.turn, self.interpolates = 0.0, False
+        self.turn, self.interpolates, self.fits = 0.0, False, True
 
     def proceeds_beyond(self, edge: float) -> bool:
         """Consider facets cut to `edge`, m. Whether shorter edges may allow a cheaper plan."""
         mirror, limits = self.view.mirror, self.limits
-        sizes = self.longest / np.where(mirror, edge, min(limits.cell, 1e30))
-        count = float(np.maximum(1.0, PIECES * sizes**2).sum())
-        if count > self.most or (self.exact is not None and count > WORTH_FLOAT32 * self.exact.n_facets):
+        on_host = self.rough[0] + float(np.maximum(1.0, PIECES * (self.longest[mirror] / edge) ** 2).sum())
+        count = on_host + self.rough[1]
+        self.fits = on_host <= self.in_memory
+        if not self.fits or count > MOST_FACETS:
+            return False
+        if self.exact is not None and count > WORTH_FLOAT32 * self.exact.n_facets:
             return False
         is_small = count * limits.terms <= FLOAT64_TERMS and self.cross_ratio <= DARK
         rounding = self._rounding(edge) + self.weights.rounding
@@ -186,7 +196,7 @@ class _PlanSearch:
         """Take the cheapest number of frequency nodes whose error, beside a `fixed` one, meets the tolerance."""
         view, weights = self.view, self.weights
         per_node = cost_model.FACET_NODE + 4 * cost_model.FACET_TAP * len(view.polarizations)
-        band = over_band(view, edge, self.limits.cell)
+        band = self.over_band.errors(edge)
         for power, n in ((power, n) for power in band for n in range(1, MOST_NODES + 1)):
             error = fixed + weights.with_phase(n, band[power])
             self.least = min(self.least, self._required(gain, error))
@@ -217,8 +227,9 @@ class _PlanSearch:
             return ToleranceUnreachable(tolerance, reach, limit, remedy, how=how)
         if tolerance <= self.least_rounding < np.inf:  # inf: even the largest pieces are too many
             return ToleranceUnreachable(tolerance, reach, float32, how="with facets in float32")
-        how, remedy = f"without cutting these facets into more than {self.most:,.0f}", "take a smaller scene"
-        if self.in_memory < MOST_FACETS:
+        most, remedy = MOST_FACETS if self.fits else self.in_memory, "take a smaller scene"
+        how = f"without cutting these facets into more than {most:,.0f}"
+        if most < MOST_FACETS:
             memory = size_text(self.limits.max_bytes)
             how += f" (about {FACET_BYTES} bytes per facet of max_bytes, {memory})"
             remedy += ", a track farther away, or a larger max_bytes"

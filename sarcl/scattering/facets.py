@@ -87,6 +87,10 @@ class FacetSet:
             return
         yield from self.illumination.spans(lambda level: self._weighed(level[self.kept]))
 
+    def within(self, first: int, stop: int, n_pulses: int) -> FacetSet:
+        """What pulses first ... stop - 1 of n see of them, as pulses 0 ..."""
+        return self if stop - first == n_pulses else self.between(first, stop)
+
     def between(self, first: int, stop: int) -> FacetSet:
         """What pulses first ... stop - 1 see of them, as pulses 0 ..."""
         return replace(
@@ -123,6 +127,11 @@ class FacetSet:
         if not changing.any():
             return self, None
         return None if changing.all() else self._some(~changing), self._some(changing)
+
+    @property
+    def n_partly_lit(self) -> int:
+        """Number of facets of which some pulse sees a part past the others."""
+        return 0 if self.lit_rows is None else int(np.count_nonzero(self.lit_rows >= 0))
 
     def _some(self, which: np.ndarray) -> FacetSet:
         lit_parts, lit_rows = self.lit_parts, None if self.lit_rows is None else self.lit_rows[which]

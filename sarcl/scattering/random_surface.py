@@ -10,7 +10,7 @@ source   docs/theory/facets.md
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -50,21 +50,22 @@ class Pieces:
     def __len__(self) -> int:
         return len(self.height)
 
-    def sampled_cells(self, most: int) -> tuple[Scene, float]:
-        """The cells, of which each represents one: `speckle_contrast.judge` draws from them."""
-        return self.cells, 1.0
-
 
 def cell_edge(waveform: Waveform) -> float:
     """Length, m, of half a resolution cell in slant range, to which random facets are cut."""
     return SPEED_OF_LIGHT / (4 * waveform.bandwidth)
 
 
-def pieces_of(scene: Scene, cell: float, edge: float, seed: int) -> Pieces:
+def pieces_of(scene: Scene, cell: float, edge: float, seed: int, some: np.ndarray | None = None) -> Pieces:
     """A scene's facets, random ones cut to cells of about `cell`, m, and coherent ones to `edge`, m; inf: not at all.
 
+    some  facets that count (k,) bool; None: all
     MemoryError above 50 million facets.
     """
+    if some is not None and not some.all():
+        rows = np.flatnonzero(some)
+        part = pieces_of(with_facets(scene, scene.triangles[rows], rows), cell, edge, seed)
+        return replace(part, original=scene, of=rows[part.of])
     triangles, cell_of = _cut(scene.triangles, np.where(facet_kinds.random(scene), ROUND * cell, np.inf))
     cells = with_facets(scene, triangles, cell_of)
     rough, places = facet_kinds.rough(cells), centroids(triangles)

@@ -1,4 +1,4 @@
-"""Pieces of a scene that is rough throughout: cut, placed and given their random numbers on a device, which reads them.
+"""Pieces of the rough facets of a scene: cut, placed and given their random numbers on a device, which reads them.
 
 The host works facet by facet, as they were given. Only what is asked for comes back: pieces of some facets, as samples
 for planners, or all, for sums in float64. The surface is that of random_surface.py.
@@ -8,6 +8,7 @@ source   docs/theory/facets.md; kernels/facet_pieces.cl
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -20,14 +21,17 @@ from ..base.morton import morton_order
 from ..opencl.device import GROUP, Device
 from ..opencl.launch_numbers import launch_numbers
 from ..scene.scene import Scene
-from ..scene.triangles import areas, centroids, cut, edges, normals, refuse_many, too_many
+from ..scene.triangles import areas, centroids, cut_lengths, edges, normals, refuse_many, too_many
 from ..visibility.illumination import Illumination
 from . import facet_kinds
 from .facet_plan import MOST_FACETS
 from .facets import FacetSet
-from .random_surface import RANDOM_STREAMS, ROUND, Pieces, pieces_of, with_facets
+from .random_surface import RANDOM_STREAMS, ROUND, with_facets
 
 KERNELS = "facet_pieces.cl"
+# Pieces that are on a device together: some 200 MB of them, beside as many that are being made
+BLOCK = 2**21
+PIECE_BYTES = 84  # bytes of a piece on the device: offsets, edges, reflectivity, random numbers
 # of edges of what a work-item cuts, over those of pieces: some hundred pieces each, of which a path has a dozen cuts
 COARSE = 16
 FARTHEST = 1e9  # m, of corners: millionths of a metre of random numbers are counted exactly up to twice that
@@ -41,10 +45,11 @@ def in_groups(items: float) -> tuple[int]:
 
 @dataclass(frozen=True, eq=False)
 class RoughPieces:
-    """Facets of a scene in Morton order, and the numbers of pieces into which a device cuts them.
+    """Rough facets of a scene in Morton order, and the numbers of pieces into which a device cuts them.
 
     cell    m, to which edges are cut, inf: not at all;  seed  of the random surface
     facets  m (k, 3, 3), parts of the scene's facets `of` (k,): large ones in several parts;  counts  of pieces (k,)
+    lengths  of the facets' edges, m (k, 3), by which their longest is chosen
     some    numbers, rising, of the pieces that count (n,); None: all of these facets
     """
 
@@ -53,38 +58,40 @@ class RoughPieces:
     cell: float
     seed: int
     facets: np.ndarray
+    lengths: np.ndarray
     of: np.ndarray
     counts: np.ndarray
     some: np.ndarray | None = None
 
     @classmethod
-    def cut(cls, device: Device, scene: Scene, cell: float, seed: int) -> RoughPieces:
-        """The facets of a scene that `suits` a device. MemoryError above 50 million pieces."""
-        facets, of, longest = (
-            scene.triangles,
-            np.arange(len(scene.triangles)),
-            np.maximum.reduce(edges(scene.triangles)),
-        )
+    def cut(cls, device: Device, scene: Scene, cell: float, seed: int, some: np.ndarray) -> RoughPieces:
+        """Pieces of some of the facets that are `suited` to a device (k,) bool. MemoryError above 50 million pieces."""
+        of = np.flatnonzero(some)
+        facets = scene.triangles if some.all() else scene.triangles[of]
+        lengths = edges(facets).T
+        longest = lengths.max(axis=1)
         refuse_many(facets, ROUND * cell, MOST_FACETS)
         if np.maximum(longest / (ROUND * cell), 1.0).sum() > MOST_FACETS:  # pieces along one edge of each
             raise too_many(ROUND * cell, MOST_FACETS)
         large = longest > COARSE * ROUND * cell
         if large.any():
-            parts, whole = cut(facets[large], COARSE * ROUND * cell, MOST_FACETS)
+            parts, sizes, whole = cut_lengths(facets[large], COARSE * ROUND * cell, MOST_FACETS)
             facets, of = np.concatenate([facets[~large], parts]), np.concatenate([of[~large], of[large][whole]])
+            lengths = np.concatenate([lengths[~large], sizes])
         order = morton_order(centroids(facets))
-        pieces = cls(device, scene, cell, seed, facets[order], of[order], np.zeros(len(of), np.int32))
+        counts = np.zeros(len(of), np.int32)
+        pieces = cls(device, scene, cell, seed, facets[order], lengths[order], of[order], counts)
         pieces = replace(pieces, counts=pieces._counted())
         if len(pieces) > MOST_FACETS or pieces.counts.min(initial=1) == 0:
             raise too_many(ROUND * cell, MOST_FACETS)
         return pieces
 
     @staticmethod
-    def suits(device: Device, scene: Scene) -> bool:
-        """Whether a device can cut the facets of a scene: all are rough, none has a coherent part."""
+    def suited(device: Device, scene: Scene) -> np.ndarray:
+        """Facets of a scene that a device can cut (k,) bool: rough ones without a coherent part."""
         within = max(scene.triangles.max(initial=0), -scene.triangles.min(initial=0)) < FARTHEST
         rough = facet_kinds.rough(scene) & ~facet_kinds.coherent(scene)
-        return device.info.fp64 and len(rough) > 0 and bool(within and rough.all())
+        return rough if device.info.fp64 and within else np.zeros_like(rough)
 
     def __len__(self) -> int:
         return int(self.counts.sum(dtype=np.int64)) if self.some is None else len(self.some)
@@ -95,32 +102,38 @@ class RoughPieces:
         reach = STEEPEST * float(self.scene.roughness.max())
         return box(self.facets.reshape(-1, 3)) + np.array([[-reach], [reach]])
 
-    @property
-    def on_host(self) -> Pieces:
-        """The pieces in another order, on the host."""
-        return pieces_of(self.scene, self.cell, np.inf, self.seed)
-
     def number_of(self, given: np.ndarray) -> int:
         """Number of the pieces of some of the scene's facets (k,) bool."""
         return int(self.counts[given[self.of]].sum(dtype=np.int64))
 
     def within(self, given: np.ndarray) -> RoughPieces:
         """The pieces of some of the scene's facets (k,) bool."""
-        return self if given.all() else self.rows(np.flatnonzero(given[self.of]))
+        index = np.flatnonzero(given[self.of])
+        return self if len(index) == len(self.of) else self.rows(index)
 
-    def rows(self, index: np.ndarray) -> RoughPieces:
+    def rows(self, index: np.ndarray | slice) -> RoughPieces:
         """All pieces of facets `index` of these, in this order."""
-        return replace(self, facets=self.facets[index], of=self.of[index], counts=self.counts[index], some=None)
+        parts = {name: getattr(self, name)[index] for name in ("facets", "lengths", "of", "counts")}
+        return replace(self, **parts, some=None)
+
+    def blocks(self) -> Iterator[tuple[slice, RoughPieces]]:
+        """The pieces in parts of about BLOCK, all of each facet in one: numbers of the pieces, and these."""
+        ends, first = np.cumsum(self.counts, dtype=np.int64), 0
+        while first < len(ends):
+            begin = int(ends[first] - self.counts[first])
+            stop = int(np.searchsorted(ends, begin + BLOCK)) + 1
+            last = int(ends[min(stop, len(ends)) - 1])
+            part, here = self.rows(slice(first, stop)), slice(begin, last)
+            if self.some is not None:
+                here = slice(*np.searchsorted(self.some, [begin, last]).tolist())
+                part = replace(part, some=self.some[here] - begin)
+            if here.start < here.stop:
+                yield here, part
+            first = stop
 
     def picked(self, some: np.ndarray) -> RoughPieces:
         """Pieces of these numbers, rising, alone."""
         return self if len(some) == len(self) else replace(self, some=some)
-
-    def cells(self) -> tuple[Scene, np.ndarray]:
-        """The pieces without random heights as a scene, and which of the scene's facets each is a part of (n,)."""
-        corners, row = self.corners()
-        of = self.of[row]
-        return with_facets(self.scene, corners, of), of
 
     def sampled_cells(self, most: int) -> tuple[Scene, float]:
         """About `most` of the pieces as a scene, drawn with all of their facet, and the number that each represents."""
@@ -148,7 +161,7 @@ class RoughPieces:
         float32 (., stride).
 
         surfaces  (n, n_kinds): what pieces of a kind share, as place_pieces of the kernels reads it
-        kinds     of the scene's facets (k,)
+        kinds     of these facets (k,)
         """
         device, has_heights = self.device, bool(self.scene.roughness.any())
         facets, owners, paths = self._listed()
@@ -161,7 +174,7 @@ class RoughPieces:
         )  # fmt: skip
         device.run(
             device.kernel(KERNELS, "place_pieces"), (stride // device.info.vector_width,), None, numbers,
-            facets, owners, paths, device.upload(kinds[self.of].astype(np.int32)),
+            facets, owners, paths, device.upload(kinds.astype(np.int32)),
             device.upload(surfaces.astype(np.float64)), centers, planes,
         )  # fmt: skip
         return centers, planes
@@ -186,7 +199,8 @@ class RoughPieces:
     def _walk(self, listed: int, *buffers: object) -> object:
         """Run walk_pieces on its last four buffers; returns that of the facets."""
         device, k = self.device, len(self.facets)
-        facets, limit = device.upload(self.facets), np.array(ROUND * self.cell).view(np.uint64)
+        facets = device.upload(np.concatenate([self.facets.reshape(k, 9), self.lengths], axis=1))
+        limit = np.array(ROUND * self.cell).view(np.uint64)
         numbers = launch_numbers(KERNELS, "walk_pieces", n_facets=k, listed=listed, limit=limit)
         kernel = device.kernel(KERNELS, "walk_pieces")
         device.run(kernel, in_groups(k / device.info.vector_width), None, numbers, facets, *buffers)
@@ -275,8 +289,9 @@ class RoughFacets(FacetSet):
 
     def tiling_numbers(self, nodes: np.ndarray, metal: bool, dispersive: bool) -> tuple[np.ndarray, np.ndarray]:
         """Arguments `surfaces` and `kinds` of `RoughPieces.placed`."""
-        scene, kinds = self.pieces.scene, facet_kinds.kinds(self.pieces.scene)
-        _, some, kinds = np.unique(kinds, return_index=True, return_inverse=True)
+        scene, of = self.pieces.scene, self.pieces.of
+        _, some, kinds = np.unique(facet_kinds.kinds(scene, of), return_index=True, return_inverse=True)
+        some = of[some]
         alike = FacetSet(
             scene.triangles[some], scene.reflectivity[some], scene.two_sided[some], scene.material[some],
             scene.materials, None, some, np.zeros(len(some), np.complex64),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 
@@ -11,6 +11,7 @@ import numpy as np
 from ..base import boxes
 from ..base.constants import EDGE_ON
 from ..base.errors import warn
+from ..base.text import size_text
 from ..numerics.pulse_geometry import PulseGeometry
 from ..opencl.device import Device
 from ..scene import triangles as geometry
@@ -20,9 +21,11 @@ from ..visibility.illumination import ALL_DARK, Illumination, lit
 from ..visibility.lit_parts import ON_PLANE, FacetPieces, LitParts
 from ..visibility.swept_shadows import never_shaded
 from .facet_kinds import coherent
+from .facet_plan import FACET_BYTES
 from .facets import FacetSet
-from .random_surface import Pieces
+from .random_surface import Pieces, with_facets
 from .rough_pieces import RoughFacets, RoughPieces
+from .subdivision import CutScene
 
 Progress = Callable[[int, int], object]  # called as progress(pulse, pulses)
 # Facets count as small where their sides are less than so many times the distance below which corners lie in a plane;
@@ -68,6 +71,7 @@ class ShadowRule:
     exact    lit parts of coherent facets are computed; False: all shadows are shares, from samples
     sampled, accuracy  shadows on incoherent facets are shares; with this error relative to the norm of these facets
     margin   m: antennas of channels stand up to this far from these;  max_bytes  for lit parts, and for shares
+    host     bytes for pieces on the host
     """
 
     exact: bool
@@ -75,71 +79,129 @@ class ShadowRule:
     accuracy: float
     max_bytes: float
     margin: float = 0.0
+    host: float = np.inf
+
+    def check_room(self, n: int) -> None:
+        """MemoryError for more pieces on which shadows may fall than the host holds."""
+        if n * FACET_BYTES > self.host:
+            raise MemoryError(
+                f"shadows may fall on {n:,} pieces of rough facets, which take {size_text(n * FACET_BYTES)}; max_bytes "
+                f"allows {size_text(self.host)}. Take a smaller scene, a larger max_bytes, or shadows=False"
+            )
 
 
 def facets_of(
-    pieces: Pieces | RoughPieces,
+    cut: CutScene,
     antennas: PulseGeometry,
     *,
     shadows: ShadowRule | None,
     skips: set[str],
     device: Device,
     progress: Callable[[str, int, int], object],
-) -> tuple[FacetSet | None, dict[str, int]]:
-    """Facets of a scene, displaced, culled and illuminated, and counts of pairs left out: reason -> count.
+) -> tuple[tuple[FacetSet, ...], dict[str, int]]:
+    """Facets of a scene, displaced, culled and illuminated: those that a device cuts, in blocks, and those of the host,
+    in sets that hold any; and counts of pairs left out: reason -> count.
 
+    shadows   None: every facet is seen whole
     progress  called as progress("scene", 2, 3) when facets are culled, progress("shadows", pulses done, pulses) while
               they are illuminated, progress("scene", 3, 3) then
     """
-    if isinstance(pieces, RoughPieces):
-        if shadows is None or not shadows.exact or shadows.sampled:
-            return _rough_facets_of(pieces, antennas, shadows=shadows, skips=skips, progress=progress)
-        pieces = pieces.on_host
-    scene, original = pieces.scene, pieces.original
+    original, rough, host, lit_parts = cut.original, cut.rough, None, None
     check_antennas_above(original, antennas)
-    triangles, normals = scene.triangles, geometry.normals(scene.triangles)
-    if pieces.height.any():
-        triangles = triangles + (pieces.height[:, None] * normals)[:, None]
-    culling = _Culling(scene, skips, antennas, lambda which: int(which.sum()))
-    culling.cull(geometry.centroids(triangles), normals)
+    culling, illumination = _Culling(skips, antennas), None
+    if rough is not None:  # culled by the facets that they are parts of
+        keep = culling.kept(original, rough.bounds, geometry.normals(original.triangles), rough.number_of)
+        rough = rough.within(keep) if rough.number_of(keep) else None
+    if cut.host is not None:
+        host = _HostFacets.culled(cut.host, culling, shadows)
     progress("scene", 2, 3)
-    keep, lit_parts, illumination = culling.keep, None, None
-    is_clipped, is_sampled = np.zeros((2, len(keep)), bool)
-    report_shadows = partial(progress, "shadows")
     if shadows is not None:
-        if shadows.exact:  # rough facets too where they are few: their power is that of the lit part
-            is_clipped = (coherent(scene) & ~pieces.incoherent) | (not shadows.sampled)
         _warn_of_reach(original.triangles)
-        is_sampled = keep & ~is_clipped
-        casters = Casters.of(original, antennas) if is_sampled.any() else None
-        if casters is not None and casters.hides_any:
-            illumination = casters.light(scene, pieces.of, is_sampled, antennas, shadows, device, report_shadows)
-            culling.leave_out("shadowed", is_sampled & illumination.dark)
-        else:
-            is_sampled = np.zeros(len(keep), bool)
-        if (keep & is_clipped).any():
-            lit_parts = _lit_parts_of(pieces, keep & is_clipped, antennas, shadows, device, report_shadows)
-            if not (keep & ~lit_parts.dark).any():
-                warn(ALL_DARK)
-            culling.leave_out("shadowed", keep & lit_parts.dark)
+        report_shadows = partial(progress, "shadows")
+        illumination = _illumination_of(original, rough, host, antennas, shadows, device, report_shadows)
+        if host is not None and host.is_clipped.any():
+            lit_parts = _lit_parts_of(host.pieces, host.is_clipped, antennas, shadows, device, report_shadows)
+    sets: list[FacetSet] = [] if rough is None else list(_seen_rough(rough, illumination, culling))
+    if host is not None:
+        sets.append(host.seen(illumination, 0 if rough is None else len(rough), lit_parts, culling))
+    sets = [part for part in sets if len(part)]
+    if not sets and lit_parts is not None:
+        warn(ALL_DARK)
     progress("scene", 3, 3)
-    if not keep.any():
-        return None, culling.left_out
-    kept = slice(None) if keep.all() else keep  # no copies where all are kept
-    return FacetSet(
-        triangles[kept],
-        scene.reflectivity[kept],
-        scene.two_sided[kept],
-        scene.material[kept],
-        scene.materials,
-        illumination,
-        np.flatnonzero(keep),
-        pieces.random[kept],
-        lit_parts,
-        None if lit_parts is None else np.where(lit_parts.partly, np.cumsum(lit_parts.partly) - 1, -1)[kept],
-        is_sampled[kept],
-        pieces.incoherent[kept] if pieces.incoherent.any() else None,
-    ), culling.left_out
+    return tuple(sets), culling.left_out
+
+
+def _seen_rough(pieces: RoughPieces, illumination: Illumination | None, culling: _Culling) -> Iterator[FacetSet]:
+    """The pieces on a device of which an antenna sees something, in blocks; of these an illumination is the first
+    part."""
+    seen = None
+    if illumination is not None:
+        seen = np.flatnonzero(~illumination.dark[: len(pieces)])
+        culling.leave_out("shadowed", len(pieces) - len(seen))
+        pieces = pieces.picked(seen)
+    for here, part in pieces.blocks():
+        yield RoughFacets(part, illumination, None if seen is None else seen[here])
+
+
+@dataclass(frozen=True, eq=False)
+class _HostFacets:
+    """Pieces on the host that may send something back: those of `keep` (k,) bool.
+
+    triangles   m (k, 3, 3), with random heights
+    is_clipped  pieces, of those kept, whose lit parts are computed, and
+    is_sampled  those whose shares are counted in samples (k,) bool; both False: every facet is seen whole
+    """
+
+    pieces: Pieces
+    triangles: np.ndarray
+    keep: np.ndarray
+    is_clipped: np.ndarray
+    is_sampled: np.ndarray
+
+    @classmethod
+    def culled(cls, pieces: Pieces, culling: _Culling, shadows: ShadowRule | None) -> _HostFacets:
+        """The pieces less those that are left out, under a rule of shadows, None: without shadows."""
+        scene, triangles, normals = pieces.scene, pieces.scene.triangles, geometry.normals(pieces.scene.triangles)
+        if pieces.height.any():
+            triangles = triangles + (pieces.height[:, None] * normals)[:, None]
+        keep = culling.kept(scene, geometry.centroids(triangles), normals, lambda which: int(which.sum()))
+        is_clipped, is_sampled = np.zeros((2, len(keep)), bool)
+        if shadows is not None:
+            if shadows.exact:  # rough facets too where they are few: their power is that of the lit part
+                is_clipped = keep & ((coherent(scene) & ~pieces.incoherent) | (not shadows.sampled))
+            is_sampled = keep & ~is_clipped
+        return cls(pieces, triangles, keep, is_clipped, is_sampled)
+
+    def seen(
+        self, illumination: Illumination | None, first: int, lit_parts: LitParts | None, culling: _Culling
+    ) -> FacetSet:
+        """Those of which an antenna sees something; in an illumination they are numbers `first` and on."""
+        scene, pieces, keep, is_sampled = self.pieces.scene, self.pieces, self.keep, None
+        if illumination is not None and self.is_sampled.any():
+            dark = self.is_sampled & illumination.dark[first:]
+            culling.leave_out("shadowed", int(dark.sum()))
+            keep, is_sampled = keep & ~dark, self.is_sampled
+        else:
+            illumination = None
+        if lit_parts is not None:
+            dark = keep & lit_parts.dark
+            culling.leave_out("shadowed", int(dark.sum()))
+            keep = keep & ~dark
+        kept = slice(None) if keep.all() else keep  # no copies where all are kept
+        return FacetSet(
+            self.triangles[kept],
+            scene.reflectivity[kept],
+            scene.two_sided[kept],
+            scene.material[kept],
+            scene.materials,
+            illumination,
+            first + np.flatnonzero(keep),
+            pieces.random[kept],
+            lit_parts,
+            None if lit_parts is None else np.where(lit_parts.partly, np.cumsum(lit_parts.partly) - 1, -1)[kept],
+            None if is_sampled is None else is_sampled[kept],
+            pieces.incoherent[kept] if pieces.incoherent.any() else None,
+        )
 
 
 def _lit_parts_of(
@@ -152,71 +214,74 @@ def _lit_parts_of(
     return LitParts(device, facets, given, antennas.ends, progress=progress, **options)
 
 
-def _rough_facets_of(
-    pieces: RoughPieces,
+def _illumination_of(
+    scene: Scene,
+    rough: RoughPieces | None,
+    host: _HostFacets | None,
     antennas: PulseGeometry,
-    *,
-    shadows: ShadowRule | None,
-    skips: set[str],
-    progress: Callable[[str, int, int], object],
-) -> tuple[FacetSet | None, dict[str, int]]:
-    """As `facets_of`, of pieces on a device: culled by the facets that they are parts of, unless shadows fall on
-    them."""
-    scene, n_pulses = pieces.scene, len(antennas.tx)
-    check_antennas_above(scene, antennas)
-    culling = _Culling(scene, skips, antennas, pieces.number_of)
-    culling.cull(pieces.bounds, geometry.normals(scene.triangles))
-    keep, left_out = culling.keep, culling.left_out
-    progress("scene", 2, 3)
-    casters = None
-    if shadows is not None:
-        _warn_of_reach(scene.triangles)
-        casters = Casters.of(scene, antennas)
-    if shadows is None or casters is None or not casters.hides_any or not keep.any():
-        progress("scene", 3, 3)
-        return RoughFacets(pieces.within(keep)) if keep.any() else None, left_out
-    pieces = pieces.within(keep)
-    is_lit = casters.never_shade(pieces, antennas)
-    rest = pieces.rows(np.flatnonzero(~is_lit))
-    cut, of = rest.cells()
-    report_shadows = partial(progress, "shadows")
-    power = scene.reflectivity[pieces.of] ** 2 * geometry.areas(pieces.facets)
-    illumination = casters.light(
-        cut, of, np.ones(len(of), bool), antennas, shadows, pieces.device, report_shadows, float(power[is_lit].sum())
-    )
-    index = np.flatnonzero(np.repeat(~is_lit, pieces.counts))
-    illumination = illumination.among(index, len(pieces))
-    seen = np.flatnonzero(~illumination.dark)
-    left_out["shadowed"] = (len(pieces) - len(seen)) * n_pulses
-    progress("scene", 3, 3)
-    return RoughFacets(pieces.picked(seen), illumination, seen) if len(seen) else None, left_out
+    rule: ShadowRule,
+    device: Device,
+    progress: Progress,
+) -> Illumination | None:
+    """Shares, from samples, of the pieces of a scene on a device, and then of all of the host, of which those count
+    that are sampled; None: all of these are seen whole."""
+    rows = np.zeros(0, np.int64) if host is None else np.flatnonzero(host.is_sampled)
+    if rough is None and not len(rows):
+        return None
+    casters = Casters.of(scene, antennas)
+    if not casters.hides_any:
+        return None
+    n_rough, beside = 0 if rough is None else len(rough), 0.0
+    parts: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []  # corners, facets of the scene, numbers of pieces
+    if rough is not None:
+        is_shaded, power = casters.shade(scene, rough.facets, rough.of, antennas)
+        beside += power
+        if is_shaded.any():
+            rest = rough.rows(np.flatnonzero(is_shaded))
+            rule.check_room(len(rest))
+            corners, row = rest.corners()
+            number = np.flatnonzero(np.repeat(is_shaded, rough.counts))
+            parts.append((corners, rough.of[is_shaded][row], number))
+    if host is not None and len(rows):
+        pieces = host.pieces
+        is_shaded, power = casters.shade(scene, pieces.scene.triangles[rows], pieces.of[rows], antennas)
+        beside, rows = beside + power, rows[is_shaded]
+        parts.append((pieces.scene.triangles[rows], pieces.of[rows], n_rough + rows))
+    corners, of, number = (np.concatenate(values) for values in zip(*parts, strict=True)) if parts else [rows[:0]] * 3
+    if not len(number):
+        return None
+    cut = with_facets(scene, corners, of)
+    light = casters.light(cut, of, antennas, rule, device, progress, beside)
+    return light.among(number, n_rough + (0 if host is None else len(host.pieces)))
 
 
 class _Culling:
-    """Facets `keep` (k,) that may send something back, and counts of the other pairs with pulses: reason -> count.
+    """Pieces that are left out, and counts of their pairs with pulses: reason -> count."""
 
-    number_of  counts the pieces of facets (k,) bool
-    """
-
-    def __init__(
-        self, scene: Scene, skips: set[str], antennas: PulseGeometry, number_of: Callable[[np.ndarray], int]
-    ) -> None:
-        self.scene, self.skips, self.antennas, self.number_of = scene, skips, antennas, number_of
-        self.keep = np.ones(len(scene.triangles), bool)
+    def __init__(self, skips: set[str], antennas: PulseGeometry) -> None:
+        self.skips, self.antennas = skips, antennas
         self.left_out = {"zero reflectivity": 0, "facing away": 0, "shadowed": 0}
 
-    def leave_out(self, reason: str, which: np.ndarray) -> None:
-        """Keep no facets of `which` (k,), all of them kept so far."""
-        self.left_out[reason] += self.number_of(which) * len(self.antennas.tx)
-        self.keep &= ~which
+    def leave_out(self, reason: str, number: int) -> None:
+        """Count a number of pieces, which no pulse adds."""
+        self.left_out[reason] += number * len(self.antennas.tx)
 
-    def cull(self, centers: np.ndarray, normals: np.ndarray) -> None:
-        """Leave out facets that reflect nothing or face away, where `skips` says so; arguments as of `faces_away`."""
+    def kept(
+        self, scene: Scene, centers: np.ndarray, normals: np.ndarray, number_of: Callable[[np.ndarray], int]
+    ) -> np.ndarray:
+        """Facets of a scene (k,) bool but those that reflect nothing or face away, where `skips` says so.
+
+        centers, normals  as of `faces_away`;  number_of  counts the pieces of facets (k,) bool
+        """
+        keep = np.ones(len(normals), bool)
         if "zero reflectivity" in self.skips:
-            self.leave_out("zero reflectivity", self.scene.reflectivity == 0)
+            keep = scene.reflectivity != 0
+            self.leave_out("zero reflectivity", number_of(~keep))
         if "facing away" in self.skips:
-            away = self.keep & ~self.scene.two_sided & faces_away(centers, normals, self.antennas)
-            self.leave_out("facing away", away)
+            away = keep & ~scene.two_sided & faces_away(centers, normals, self.antennas)
+            self.leave_out("facing away", number_of(away))
+            keep &= ~away
+        return keep
 
 
 def _warn_of_reach(triangles: np.ndarray) -> None:
@@ -266,14 +331,13 @@ class Casters:
         self,
         pieces: Scene,
         of: np.ndarray,
-        wanted: np.ndarray,
         antennas: PulseGeometry,
         rule: ShadowRule,
         device: Device,
         progress: Progress,
-        beside: float = 0.0,
+        beside: float,
     ) -> Illumination:
-        """Shares of pieces of a scene's facets `of` (k,), those `wanted` (k,), that antennas see past these casters.
+        """Shares of pieces of a scene's facets `of` (k,) that antennas see past these casters.
 
         beside  power of other pieces, which all antennas see whole
 
@@ -285,7 +349,6 @@ class Casters:
             antennas.tx,
             None if antennas.is_monostatic else antennas.rx,
             two_sided=pieces.two_sided,
-            wanted=wanted,
             tolerance=min(FINEST[0], FINEST[1] * rule.accuracy),
             accuracy=rule.accuracy,
             weights=pieces.reflectivity**2 * geometry.areas(pieces.triangles),
@@ -297,14 +360,16 @@ class Casters:
             progress=progress,
         )
 
-    def never_shade(self, pieces: RoughPieces, antennas: PulseGeometry) -> np.ndarray:
-        """Facets of pieces (k,) that are certain to be seen whole by all antennas: of the terrain, which these stand
-        on."""
-        is_lit = (self.on_heights & ~self.hidden_by_floor)[pieces.of]
+    def shade(
+        self, scene: Scene, facets: np.ndarray, of: np.ndarray, antennas: PulseGeometry
+    ) -> tuple[np.ndarray, float]:
+        """Parts of a scene's facets `of` (k,), m (k, 3, 3), of which some antenna may not see the whole (k,) bool; and
+        the power of the others, which lie on the terrain."""
+        is_lit = (self.on_heights & ~self.hidden_by_floor)[of]
         rows = np.flatnonzero(is_lit)
-        two_sided = pieces.scene.two_sided[pieces.of[rows]]
-        is_lit[rows] = never_shaded(pieces.facets[rows], two_sided, self.solid, antennas.ends)
-        return is_lit
+        is_lit[rows] = never_shaded(facets[rows], scene.two_sided[of[rows]], self.solid, antennas.ends)
+        power = scene.reflectivity[of[is_lit]] ** 2 * geometry.areas(facets[is_lit])
+        return ~is_lit, float(power.sum())
 
     def _pieces_hidden_by_floor(self, pieces: Scene, of: np.ndarray, antennas: PulseGeometry) -> np.ndarray:
         """Pieces of facets `of` (k,) that the terrain may hide (k,): of a wall, those near the ground alone."""

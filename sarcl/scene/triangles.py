@@ -68,21 +68,32 @@ def cut(triangles: np.ndarray, max_edge: float, max_facets: int) -> tuple[np.nda
     Returns them (n, 3, 3), and which of the given triangles each is a part of (n,). MemoryError where n would exceed
     max_facets.
     """
+    parts, _, rows = cut_lengths(triangles, max_edge, max_facets)
+    return parts, rows
+
+
+def cut_lengths(triangles: np.ndarray, max_edge: float, max_facets: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """As `cut`, with the lengths of the parts' edges, m (n, 3), by which further cuts choose the longest.
+
+    Halves of an edge have half its length to the last bit, which lengths between corners may not have: of edges alike,
+    rounding would decide.
+    """
     refuse_many(triangles, max_edge, max_facets)
-    parts, rows, n = [triangles[:0]], [np.zeros(0, np.int64)], 0
+    parts, sizes, rows, n = [triangles[:0]], [np.zeros((0, 3))], [np.zeros(0, np.int64)], 0
     for block, corners in _blocks(triangles):
         row, lengths = np.arange(block.start, block.stop), edges(triangles[block])
         while len(row):
             is_long = np.maximum.reduce(lengths) > max_edge
             long, short = np.flatnonzero(is_long), np.flatnonzero(~is_long)
             parts.append(np.ascontiguousarray(corners.take(short, axis=2).transpose(2, 0, 1)))
+            sizes.append(lengths.take(short, axis=1).T)
             rows.append(row[short])
             n += len(short)
             if n + 2 * len(long) > max_facets:
                 raise too_many(max_edge, max_facets)
             corners, lengths = _halves(corners.take(long, axis=2), lengths.take(long, axis=1))
             row = np.tile(row[long], 2)
-    return np.concatenate(parts), np.concatenate(rows)
+    return np.concatenate(parts), np.concatenate(sizes), np.concatenate(rows)
 
 
 def too_many(max_edge: float, max_facets: int) -> MemoryError:

@@ -49,8 +49,10 @@ class EchoWork(NamedTuple):
         request, seen = scene.request, scene.seen
         n_points = len(seen.scene.positions) if request.same else 0
         smooth, rough = pieces_of(scene)
-        on_device = rough > 0 and RoughPieces.suits(request.device, seen.scene)
-        cutting = (cost_model.CUT_PIECE_ON_DEVICE if on_device else cost_model.CUT_PIECE) * (smooth + rough)
+        device = None if scene.subdivision is None else scene.subdivision.device
+        on_device = device is not None and RoughPieces.suited(device, seen.scene).any()
+        cut_rough = cost_model.CUT_PIECE_ON_DEVICE if on_device else cost_model.CUT_PIECE
+        cutting = cost_model.CUT_PIECE * smooth + cut_rough * rough
         lit, n_pulses = 0.0, len(seen.antennas)
         if request.shadows:
             sampled = samples_shadows(request, seen)

@@ -55,9 +55,11 @@ class TiledFacets(TiledScatterers):
 
     def __init__(
         self, request: EchoRequest, facets: FacetSet, plan: FacetPlan, antennas: PulseGeometry, waveform: Waveform,
-        weights: AntennaWeights,
+        weights: AntennaWeights, *, stays: bool = True,
     ) -> None:  # fmt: skip
-        """antennas, waveform, weights  of all channels: samples of patches are computed for them"""
+        """antennas, waveform, weights  of all channels: samples of patches are computed for them
+        stays  False: pieces that a device cuts do not stay on it
+        """
         device = request.device
         self.of = lambda some: TiledFacets(request, some, plan, antennas, waveform, weights)
         self.facets, self.facet_plan, nodes = facets, plan, plan.nodes
@@ -72,7 +74,8 @@ class TiledFacets(TiledScatterers):
 
         tiling: Tiling
         if isinstance(facets, RoughFacets):
-            tiling = PieceTiling(facets.pieces, *facets.tiling_numbers(nodes, self.metal, self.dispersive))
+            numbers = facets.tiling_numbers(nodes, self.metal, self.dispersive)
+            tiling = PieceTiling(facets.pieces, *numbers, stays=stays)
             positions = tiling.bounds  # no patches are sampled of random phases
         else:
             positions = centroids(facets.triangles)
@@ -243,6 +246,7 @@ class FacetSpreader:
             counts += Counts(pairs, pairs - inside - unlit, inside - front, unlit)
             clock.lap("spectra")
             on_progress(counts.pairs)
+        self.tiles.release()
         return counts
 
     def _pulse_blocks(self, first: int, end: int) -> Iterator[PulseLevels]:

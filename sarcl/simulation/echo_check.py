@@ -35,15 +35,14 @@ class PulseRows(Protocol):
 
 def draws_of(scene: SceneEchoes) -> int:
     """Number of pulses that are checked, and of samples at each: 16, fewer where there are over 20 000 facets."""
-    n = 0 if scene.facets is None else len(scene.facets)
+    n = sum(map(len, scene.facets))
     return int(np.clip(np.sqrt(FACET_SAMPLES / max(n, 1)), FEWEST_DRAWS[n > MANY_FACETS], MOST_DRAWS))
 
 
 def seconds_to_check(scene: SceneEchoes) -> float:
     """About the seconds that `measure_error` takes, on one core."""
-    points, facets = (0 if part is None else len(part) for part in (scene.points, scene.facets))
-    rows = None if scene.facets is None else scene.facets.lit_rows
-    partly = 0 if rows is None else int((rows >= 0).sum())
+    points, facets = 0 if scene.points is None else len(scene.points), sum(map(len, scene.facets))
+    partly = sum(part.n_partly_lit for part in scene.facets)
     draws = draws_of(scene)
     per_point = PER_GAIN if scene.weights.varies_over_band else PER_POINT
     return MOST_DRAWS**2 * points * per_point + draws**2 * facets * PER_FACET + draws * partly * PER_LIT_PART
@@ -103,7 +102,7 @@ def exact(
     view = ChannelView(antennas, weights, frequencies, 0.0, request.polarizations, request.vertical, gated=True)
     values = np.zeros((len(request.polarizations), len(frequencies)), np.complex128)
     powers = np.zeros(values.shape)
-    for part in (scene.points, scene.facets):
+    for part in (scene.points, *scene.facets):
         if part is not None:
             value, power = _exact(part, view, pulse)
             values, powers = values + value, powers + power

@@ -38,8 +38,9 @@ class SceneEchoes:
 
     weights, weight_error  of antennas and distances, and their errors
     subdivision            how facets were cut, None where there are none
-    points, facets         None where none are left;  prepared_points, tiled_facets  the same as channels plan them:
-                           facets on the device, partly lit ones apart from the others
+    points                 None where none are left;  facets  sets: those that a device cut, and those of the host
+    prepared_points, tiled_facets  the same as channels plan them: facets on the device, partly lit ones apart from the
+                           others
     skipped                pairs of scatterer and pulse that were left out: reason -> count
     mesh_warnings          what a report says of meshes that are too coarse
     error_budget           the share of the tolerance that points have, and facets
@@ -51,7 +52,7 @@ class SceneEchoes:
     weight_error: WeightError
     subdivision: Subdivision | None
     points: Points | None
-    facets: FacetSet | None
+    facets: tuple[FacetSet, ...]
     prepared_points: PreparedPoints | None
     tiled_facets: tuple[TiledFacets, ...]
     skipped: dict[str, int]
@@ -62,38 +63,37 @@ class SceneEchoes:
 
     def __len__(self) -> int:
         """Number of points and facets."""
-        return sum(len(part) for part in (self.points, self.facets) if part is not None)
-
-    @property
-    def gain(self) -> float:
-        """Norm of the cut facets over that of the facets as they were given, both added with random phases."""
-        return 1.0 if self.subdivision is None else self.subdivision.gain
+        return sum(len(part) for part in (self.points, *self.facets) if part is not None)
 
     @property
     def shadow_words(self) -> dict[str, Any]:
         """For the report: number of facets of which some pulse sees a part past the others, and whether shadows are
         sampled."""
-        rows = None if self.facets is None else self.facets.lit_rows
-        words = {} if rows is None or not (rows >= 0).any() else {"partly lit facets": int((rows >= 0).sum())}
-        if self.facets is None or not self.facets.has_sampled_shadows:
+        partly = sum(part.n_partly_lit for part in self.facets)
+        words: dict[str, Any] = {"partly lit facets": partly} if partly else {}
+        sampled = [part for part in self.facets if part.has_sampled_shadows]
+        if not sampled:
             return words
-        if not self.facets.samples_incoherent_alone:
+        if not all(part.samples_incoherent_alone for part in sampled):
             return words | UNKNOWN_SHADOWS
         return words | {"shadow edges": f"sampled, {root_sum_square(self.shadow_terms):.1e}"}
 
     def by_light(self, antennas: PulseGeometry, waveform: Waveform) -> tuple[FacetSet | None, SceneEchoes | None]:
         """The facets of which all pulses see the same share; and the others alone, on the device. None: there are
         none."""
-        if self.facets is None or self.subdivision is None:
+        if not self.facets or self.subdivision is None:
             return None, None
-        steady, changing = self.facets.steady()
+        (facets,) = self.facets  # no device has cut any
+        steady, changing = facets.steady()
         if changing is None:
             return steady, None
         tiled = tuple(
             TiledFacets(self.request, part, self.subdivision.plan, antennas, waveform, self.weights)
             for part in changing.split()
         )
-        alone = replace(self, points=None, facets=changing, prepared_points=None, tiled_facets=tiled, shadow_terms=())
+        alone = replace(
+            self, points=None, facets=(changing,), prepared_points=None, tiled_facets=tiled, shadow_terms=()
+        )
         return steady, alone
 
     def channel(
@@ -113,7 +113,7 @@ class SceneEchoes:
                 if self.prepared_points is not None:
                     self._plan_points(self.prepared_points, self.weights.at(antennas), band)
                 for tiled in self.tiled_facets:
-                    left = self.error_budget / self.gain - tiled.facet_plan.predicted_error
+                    left = self.error_budget / tiled.facet_plan.gain - tiled.facet_plan.predicted_error
                     tiled.plan(antennas, band, left, least_tolerance=0.0)
 
     @contextmanager
@@ -154,18 +154,20 @@ class SceneEchoes:
             leveled = plan.factorized_spreader(request.device, self.points, view, nodes, request.same, request.budget)
             spreaders += [] if leveled is None else [leveled]
             parts.append((ErrorTerm("points", plan.predicted_error + error, SMALLER_TOLERANCE), plan.describe()))
-        if self.facets is not None and self.subdivision is not None and self.subdivision.plan.is_float64:
-            facets = self.facets if stop - first == self.n_pulses else self.facets.between(first, stop)
-            exact = ExactFacets(facets, self.subdivision.plan, view)
-            words = exact.describe() | self.mesh_warnings | self.shadow_words
-            parts.append((ErrorTerm("facets", self.gain * exact.predicted_error, SMALLER_TOLERANCE), words))
-            spreaders.append(exact)
+        if self.subdivision is not None and self.subdivision.plan.is_float64:
+            for facets in self.facets:
+                exact = ExactFacets(facets.within(first, stop, self.n_pulses), self.subdivision.plan, view)
+                words = exact.describe() | self.mesh_warnings | self.shadow_words
+                error = self.subdivision.plan.gain * exact.predicted_error
+                parts.append((ErrorTerm("facets", error, SMALLER_TOLERANCE), words))
+                spreaders.append(exact)
         spread = []
         for tiled in self.tiled_facets:
-            facets = tiled.facets if stop - first == self.n_pulses else tiled.facets.between(first, stop)
-            share = self.error_budget / self.gain
+            gain, facets = tiled.facet_plan.gain, tiled.facets.within(first, stop, self.n_pulses)
+            share = self.error_budget / gain
             echoes = facet_echoes(tiled, facets, view, share, request.budget, method=request.method)
-            spread.append((self.gain * echoes.error, echoes.words | self.mesh_warnings | self.shadow_words))
+            words = echoes.words | (self.subdivision.plan.describe() if self.subdivision else {})
+            spread.append((gain * echoes.error, words | self.mesh_warnings | self.shadow_words))
             spreaders += echoes.spreaders
             reason = reason or echoes.reason
         by_levels = any(isinstance(one, FactorizedSpreader) for one in spreaders)

@@ -76,7 +76,8 @@ class SceneOptions(TrackOptions):
     max_bytes: float | None = option(
         None,
         "memory for blocks, default 1 GiB on CPUs, half the memory of a GPU; facets are cut into as many as it holds "
-        "(512 bytes each; at least 256 MiB), by default a quarter of the machine's memory",
+        "(512 bytes each; at least 256 MiB), by default a quarter of the machine's memory; "
+        "rough facets that a device cuts take 180 MB, however many there are",
     )
     check: bool | None = option(
         None,

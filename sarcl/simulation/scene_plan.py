@@ -138,8 +138,11 @@ def plan_scene(
         profiles = max((CUT_PROFILES * band.least_tolerance(min(PER_TILE), 0.0) for band in bands), default=0.0)
         center, bandwidth = seen.waveform.center, seen.waveform.bandwidth
         view = FacetView(scene, antennas, center, bandwidth, request.polarizations, request.vertical)
+        # lit parts are computed of pieces on the host; without bands nothing is added on a device
+        on_device = bands and (not request.shadows or samples_shadows(request, seen))
+        device = request.device if on_device else None
         limits = {"max_bytes": request.host, "profiles": profiles, "terms": terms}
-        subdivision = plan_cut(share, view, weight_error, seen.waveform, max_edge, **limits)
+        subdivision = plan_cut(share, view, weight_error, seen.waveform, max_edge, device, **limits)
         room = share / subdivision.gain - subdivision.plan.predicted_error
         if not subdivision.plan.is_float64:  # pieces are not counted yet
             _profiles_fit(bands, room, len(scene.triangles) * MOST_FACETS, share / subdivision.gain)

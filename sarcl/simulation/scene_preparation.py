@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
 from typing import Any
 
 from ..base.errors import NothingSeen, ToleranceUnreachable, warn
@@ -11,6 +11,7 @@ from ..base.tolerances import askable, rounded_up
 from ..scattering.antenna_weights import AntennaWeights
 from ..scattering.facets import FacetSet
 from ..scattering.mesh_quality import facet_error, speckle_contrast
+from ..scattering.rough_pieces import PIECE_BYTES, RoughFacets
 from ..scattering.scatterers import Points, ShadowRule, facets_of, points_of
 from ..scattering.subdivision import Subdivision
 from ..scene.scene import Scene
@@ -22,6 +23,9 @@ from .scene_plan import SHADOWS, ScenePlan, parts_of, samples_shadows
 
 LEAST = 1e-30  # largest amplitude of a scene below which echoes approach the smallest numbers of complex64
 LARGEST = 1e30  # amplitude whose sums and spectra still fit in complex64
+# Share of the memory for blocks that pieces of rough facets may take on the device; where they take more, they are made
+# anew for each block of pulses
+KEPT_PIECES = 0.5
 # Share of a tolerance for what is left out outside the beam: as little as this, since it may be a specular reflection
 UNSEEN = 1e-3
 
@@ -37,11 +41,10 @@ def prepare_scene(plan: ScenePlan, *, tiled: bool = True, exact: bool = True) ->
     if "out of beam" in request.skips:
         weights = weights.culled(UNSEEN * plan.error_budget / plan.weight_error.peak_to_rms, seen.waveform)
     points, skipped = points_of(seen.scene, request.skips, len(seen.antennas))
-    facets, subdivision, mesh_warnings = None, plan.subdivision, dict[str, Any]()
+    facets, subdivision, mesh_warnings = tuple[FacetSet, ...](), plan.subdivision, dict[str, Any]()
     if subdivision is not None:
-        facet_plan, pieces = subdivision.apply(seen.scene, request.seed, request.device if tiled else None)
-        subdivision = replace(subdivision, plan=facet_plan)
-        cells, represents = pieces.sampled_cells(speckle_contrast.SAMPLED)
+        subdivision, cut = subdivision.apply(seen.scene, request.seed)
+        cells, represents = cut.sampled_cells(speckle_contrast.SAMPLED)
         # curves are recognised in facets as they were given, speckle follows from the facets that are added up
         speckle = speckle_contrast.judge(cells, seen.antennas, seen.waveform, represents)
         mesh_warnings = warn_of_curves(plan) | _warned(speckle)
@@ -52,9 +55,10 @@ def prepare_scene(plan: ScenePlan, *, tiled: bool = True, exact: bool = True) ->
             accuracy=SHADOWS * request.tolerance / parts_of(seen.scene),
             max_bytes=request.budget / 4,
             margin=seen.margin,
+            host=request.host,
         )
         facets, left_out = facets_of(
-            pieces,
+            cut,
             seen.antennas,
             shadows=shadows if request.shadows else None,
             skips=request.skips,
@@ -86,14 +90,16 @@ def prepare_scene(plan: ScenePlan, *, tiled: bool = True, exact: bool = True) ->
     return prepared
 
 
-def _check_left(request: EchoRequest, points: Points | None, facets: FacetSet | None, skipped: dict[str, int]) -> None:
+def _check_left(
+    request: EchoRequest, points: Points | None, facets: Sequence[FacetSet], skipped: dict[str, int]
+) -> None:
     """NothingSeen where no scatterer is left that sends something back."""
-    if facets is None and points is not None and not request.same:
+    if not facets and points is not None and not request.same:
         raise NothingSeen(
             f"polarization is {request.polarizations}, in which points send back nothing: ask for 'HH' or 'VV', or "
             "give facets"
         )
-    if points is None and facets is None:
+    if points is None and not facets:
         reasons = ", ".join(why for why, n in skipped.items() if n) or "the scene is empty"
         raise NothingSeen(f"nothing is left to reflect: {reasons}; move the track or the scene")
 
@@ -107,24 +113,28 @@ def _prepared_points(plan: ScenePlan, points: Points | None, weights: AntennaWei
 
 
 def _tiled_facets(
-    plan: ScenePlan, subdivision: Subdivision | None, facets: FacetSet | None, weights: AntennaWeights
+    plan: ScenePlan, subdivision: Subdivision | None, facets: Sequence[FacetSet], weights: AntennaWeights
 ) -> tuple[TiledFacets, ...]:
     """Facets in tiles on the device, partly lit ones apart from the others; none where their sums are in float64."""
-    if facets is None or subdivision is None or subdivision.plan.is_float64:
+    if subdivision is None or subdivision.plan.is_float64:
         return ()
     seen = plan.seen
+    n_rough = sum(len(part) for part in facets if isinstance(part, RoughFacets))
+    stays = PIECE_BYTES * n_rough <= KEPT_PIECES * plan.request.budget
     return tuple(
-        TiledFacets(plan.request, part, subdivision.plan, seen.antennas, seen.waveform, weights)
-        for part in facets.split()
+        TiledFacets(plan.request, some, subdivision.plan_of(some), seen.antennas, seen.waveform, weights, stays=stays)
+        for part in facets
+        for some in part.split()
     )
 
 
-def _shadow_terms(request: EchoRequest, scene: Scene, facets: FacetSet | None) -> tuple[ErrorTerm, ...]:
+def _shadow_terms(request: EchoRequest, scene: Scene, facets: Sequence[FacetSet]) -> tuple[ErrorTerm, ...]:
     """Errors of shadows on rough facets that are counted in samples. ToleranceUnreachable where they exceed their
     share."""
-    if facets is None or not facets.samples_incoherent_alone or facets.illumination is None:
+    lights = [part.illumination for part in facets if part.illumination is not None and part.samples_incoherent_alone]
+    if not lights:
         return ()
-    share, light = SHADOWS / parts_of(scene), facets.illumination
+    share, light = SHADOWS / parts_of(scene), lights[0]  # one for all
     if light.error > share * request.tolerance:
         raise ToleranceUnreachable(
             request.tolerance,

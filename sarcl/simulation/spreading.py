@@ -118,6 +118,9 @@ class DeviceTiles:
     n_offsets: int
     last: int
 
+    def release(self) -> None:
+        """The block of pulses is done: buffers that do not stay on the device may leave it."""
+
 
 class Tiling(Protocol):
     """Scatterers that can be put into tiles on a device.

@@ -13,7 +13,7 @@ from sarcl.numerics import polynomials
 from sarcl.numerics.pulse_geometry import PulseGeometry
 from sarcl.reference import facet
 from sarcl.scattering import facet_plan
-from sarcl.scattering._frequency_nodes import over_band
+from sarcl.scattering._frequency_nodes import OverBand
 from sarcl.scattering.facet_kinds import FacetView
 from sarcl.scattering.facets import FacetSet
 from sarcl.scene.material import Material
@@ -207,7 +207,8 @@ def test_the_error_between_frequencies_is_no_more_than_samples_say(material, edg
     track = still(*(seen_from(8e3, 0.8, a) for a in np.linspace(0, 0.05, 7)))
     antennas = PulseGeometry(track.positions, track.positions)
     vertical, band = np.array([0.0, 0, 1]), bandwidth * fc
-    errors = over_band(FacetView(scene, antennas, fc, band, ["HH", "HV"], vertical), np.inf, np.inf)
+    view = FacetView(scene, antennas, fc, band, ["HH", "HV"], vertical)
+    errors = OverBand(view, np.inf, np.zeros(len(scene.triangles), bool)).errors(np.inf)
     part = FacetSet(
         scene.triangles, scene.reflectivity, scene.two_sided, scene.material, scene.materials, None, np.arange(400),
         np.exp(2j * np.pi * random.uniform(size=400)).astype(np.complex64),

@@ -7,16 +7,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.cases import REPEATED, planned_within
+from scipy.spatial.transform import Rotation
 
 import sarcl
 from sarcl.reference import facet_pieces
-from sarcl.scattering import rough_pieces
+from sarcl.scattering import rough_pieces, scatterers
 from sarcl.scattering.random_surface import ROUND, cell_edge, pieces_of
 from sarcl.scattering.rough_pieces import RoughFacets, RoughPieces
 from sarcl.scene import triangles as geometry
+from sarcl.simulation import echo_request, scene_preparation
 
+SLIGHTLY = sarcl.Material(diagram="cos", height=4e-3)
 COS, SHARP = sarcl.Material(diagram="cos"), sarcl.Material(eps_r=4.0, conductivity=1e-3, diagram="exp", width=0.5)
 CHIRP = sarcl.Waveform.chirp(center=9.6e9, bandwidth=150e6, duration=1e-6)
+TURNED = Rotation.from_rotvec([0.3, 1.1, -0.7]).as_matrix()
 RANDOM = np.random.default_rng(0)
 TRIANGLES = {
     "one that is not cut": np.eye(3)[None] * 0.1,
@@ -24,6 +28,8 @@ TRIANGLES = {
     "equilateral": np.array([[[0.0, 0, 0], [4, 0, 0], [2, 2 * np.sqrt(3), 0]]]),
     "needles": RANDOM.uniform(-3, 3, (7, 3, 3)) * [1, 1e-3, 1e-6],
     "many": RANDOM.uniform(-1, 1, (33, 3, 3)) + RANDOM.uniform(-9, 9, (33, 1, 3)),
+    # large ones, of whose parts some have two edges alike but for rounding
+    "a triangle of nine by three": np.array([[[0.0, 0, 0], [9, 0, 0], [9, 3, 0]]]) @ TURNED.T,
     "a large one beside small ones": np.concatenate([[[[0, 0, 0], [30, 0, 0], [0, 40, 5]]], RANDOM.random((5, 3, 3))]),
 }
 
@@ -38,6 +44,10 @@ def terrain(n=12, **options):
     return sarcl.Scene.from_heights(axis, axis, np.sin(x / 3) * np.cos(y / 4), **{"material": COS, **options})
 
 
+def cut(device, one, cell, seed):
+    return RoughPieces.cut(device, one, cell, seed, RoughPieces.suited(device, one))
+
+
 def track(n=8):
     return sarcl.Trajectory.circle(radius=8e3, height=6e3, arc=0.001, n_pulses=n)
 
@@ -49,9 +59,9 @@ def in_order(triangles):
 
 @pytest.mark.parametrize("name", TRIANGLES)
 def test_the_pieces_are_those_of_the_reference_to_the_last_bit(double, name):
-    pieces = RoughPieces.cut(double, scene(TRIANGLES[name]), 0.2, 0)
+    pieces = cut(double, scene(TRIANGLES[name]), 0.2, 0)
     corners, row = pieces.corners()
-    wanted, of = facet_pieces.pieces(pieces.facets, ROUND * 0.2)
+    wanted, of = facet_pieces.pieces(pieces.facets, pieces.lengths, ROUND * 0.2)
     assert np.array_equal(corners, wanted) and np.array_equal(row, of)
     assert np.array_equal(np.bincount(of, minlength=len(pieces.facets)), pieces.counts) and len(pieces) == len(wanted)
 
@@ -59,19 +69,19 @@ def test_the_pieces_are_those_of_the_reference_to_the_last_bit(double, name):
 @pytest.mark.parametrize("name", TRIANGLES)
 def test_pieces_cover_their_facets_and_are_those_that_the_host_cuts(double, name):
     triangles = TRIANGLES[name]
-    pieces = RoughPieces.cut(double, scene(triangles), 0.3, 0)
+    pieces = cut(double, scene(triangles), 0.2, 0)
     corners, row = pieces.corners()
-    assert geometry.edges(corners).max() <= ROUND * 0.3
+    assert geometry.edges(corners).max() <= ROUND * 0.2
     given = np.bincount(pieces.of[row], geometry.areas(corners), len(triangles))
     assert np.allclose(given, geometry.areas(triangles), rtol=1e-9)
-    assert np.array_equal(in_order(corners), in_order(geometry.cut(triangles, ROUND * 0.3, 10**6)[0]))
+    assert np.array_equal(in_order(corners), in_order(geometry.cut(triangles, ROUND * 0.2, 10**6)[0]))
 
 
 def test_facets_that_share_an_edge_are_cut_at_the_same_points_of_it(double):
     a, b, c, d = np.array([[0.0, 0, 0], [7, 1, 2], [3, 5, 0], [2, -6, 1]])
     sides = []
     for side in (np.array([[a, b, c]]), np.array([[b, a, d]])):
-        corners = RoughPieces.cut(double, scene(side), 0.5, 0).corners()[0].reshape(-1, 3)
+        corners = cut(double, scene(side), 0.5, 0).corners()[0].reshape(-1, 3)
         away = np.linalg.norm(np.cross(corners - a, b - a), axis=1) / np.linalg.norm(b - a)
         sides.append(np.unique(corners[away < 1e-9], axis=0))
     assert np.array_equal(*sides) and len(sides[0]) > 7 / 0.5
@@ -79,7 +89,7 @@ def test_facets_that_share_an_edge_are_cut_at_the_same_points_of_it(double):
 
 def test_a_facet_of_a_million_pieces_is_cut_in_parts(double):
     large = np.array([[[0.0, 0, 0], [400, 0, 0], [0, 300, 9]]])
-    pieces = RoughPieces.cut(double, scene(large), 0.4, 0)
+    pieces = cut(double, scene(large), 0.4, 0)
     assert len(pieces) == len(geometry.cut(large, ROUND * 0.4, 10**7)[0]) > 9e5
     assert pieces.counts.max() <= 4 * rough_pieces.COARSE**2
 
@@ -90,9 +100,9 @@ def test_too_many_pieces_are_refused_with_the_words_of_the_host(double, monkeypa
     long = scene(np.array([[[0.0, 0, 0], [1e4, 0, 0], [0, width, 0]]]))
     on_host = lambda: geometry.cut(long.triangles, ROUND * 0.1, 5000)  # noqa: E731
     texts = []
-    for cut in (lambda: RoughPieces.cut(double, long, 0.1, 0), on_host):
+    for work in (lambda: cut(double, long, 0.1, 0), on_host):
         with pytest.raises(MemoryError) as refused:
-            cut()
+            work()
         texts.append(str(refused.value))
     assert texts[0] == texts[1]
 
@@ -101,7 +111,7 @@ def test_too_many_pieces_are_refused_with_the_words_of_the_host(double, monkeypa
 def test_numbers_of_pieces_are_those_that_the_host_writes(double, roughness):
     index = np.arange(144).reshape(12, 12) % 2
     one = terrain(material=index, materials=[COS, SHARP], roughness=roughness)
-    pieces = RoughPieces.cut(double, one, cell_edge(CHIRP), 5)
+    pieces = cut(double, one, cell_edge(CHIRP), 5)
     facets, nodes = RoughFacets(pieces), np.array([9.55e9, 9.65e9])
     n, stride = len(pieces), -(-len(pieces) // 256) * 256
     centers, planes = pieces.placed(*facets.tiling_numbers(nodes, False, True), stride)
@@ -122,7 +132,7 @@ def test_numbers_of_pieces_are_those_that_the_host_writes(double, roughness):
 
 def test_samples_represent_all_pieces(double):
     steps = np.concatenate([TRIANGLES["many"], 8 * TRIANGLES["many"][:3]])
-    pieces = RoughPieces.cut(double, scene(steps), 0.2, 0)
+    pieces = cut(double, scene(steps), 0.2, 0)
     size = geometry.areas(steps).sum()
     numbers, areas = [], []
     for seed in range(20):
@@ -142,27 +152,83 @@ SCENES = {
     "two-sided sheets": (lambda: scene(terrain().triangles, two_sided=True, reflectivity=0.3), False),
     "terrain that hides nothing": (terrain, True),
     "a box on terrain": (lambda: terrain() + sarcl.shapes.box((4, 4, 3), material=COS).moved((0, 0, 2.5)), True),
+    "a smooth box on terrain": (lambda: terrain() + sarcl.shapes.box((4, 4, 3)).moved((0, 0, 2.5)), True),
+    "a slab on terrain, in shadow": (
+        lambda: terrain(roughness=0.02) + sarcl.shapes.box((4, 4, 3), material=COS).moved((0, 0, 2.5))
+        + sarcl.shapes.plate((9, 9), material=SLIGHTLY).moved((2, 0, 2)), True,
+    ),
     "random heights in shadow": (
         lambda: terrain(roughness=0.02) + sarcl.shapes.box((4, 4, 3), material=COS).moved((0, 0, 2.5)), True,
     ),
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", ["terrain", "two-sided sheets", "random heights in shadow", *(
-    pytest.param(name, marks=REPEATED) for name in ("random heights", "terrain that hides nothing", "a box on terrain")
+@pytest.mark.parametrize("name", ["terrain", "two-sided sheets", "a slab on terrain, in shadow", *(
+    pytest.param(name, marks=REPEATED) for name in ("random heights", "terrain that hides nothing", "a box on terrain",
+                                                    "a smooth box on terrain")
 )])  # fmt: skip
 def test_echoes_are_those_of_pieces_cut_on_the_host(double, monkeypatch, name):
     one, shadows = SCENES[name][0](), SCENES[name][1]
     ask = {"tolerance": 2e-2 if shadows else 1e-4, "seed": 3, "device": double, "shadows": shadows, "check": True}
+    if "slab" in name:  # its cells are cut further for their coherent part
+        ask["max_edge"] = 0.3
     plan = planned_within({"few_looks": 0}, sarcl.echo, one, CHIRP, track(), **ask)  # shadows are shares
     here = plan.run()
-    monkeypatch.setattr(RoughPieces, "suits", staticmethod(lambda device, scene: False))
+    nothing = lambda device, scene: np.zeros(len(scene.triangles), bool)  # noqa: E731
+    monkeypatch.setattr(RoughPieces, "suited", staticmethod(nothing))
     there = plan.run()
     assert here.report.measured_error <= here.report.predicted_error
     assert np.linalg.norm(here.samples - there.samples) <= ask["tolerance"] / 10 * np.linalg.norm(there.samples)
     assert here.report.contributions_done == there.report.contributions_done
     assert here.report.contributions_skipped == there.report.contributions_skipped
     assert (here.report.contributions_skipped["shadowed"] > 0) == ("box" in name or "shadow" in name)
+    assert (here.report.plan.get("partly lit facets", 0) > 0) == ("smooth" in name or "slab" in name)
+
+
+@pytest.mark.parametrize("is_picked", [False, True])
+def test_blocks_hold_each_piece_once(double, monkeypatch, is_picked):
+    monkeypatch.setattr(rough_pieces, "BLOCK", 300)
+    pieces = cut(double, scene(TRIANGLES["many"]), 0.2, 0)
+    some = np.flatnonzero(np.arange(len(pieces)) % 3 > 0) if is_picked else np.arange(len(pieces))
+    pieces = pieces.picked(some)
+    blocks = list(pieces.blocks())
+    assert len(blocks) > 3
+    assert np.array_equal(np.concatenate([np.arange(len(pieces))[here] for here, _ in blocks]), np.arange(len(pieces)))
+    whole, row = pieces.corners()
+    for here, block in blocks:
+        corners, of = block.corners()
+        assert np.array_equal(corners, whole[here]) and np.array_equal(block.of[of], pieces.of[row[here]])
+
+
+@pytest.mark.parametrize("name", ["random heights", "a slab on terrain, in shadow"])
+def test_pieces_made_anew_for_each_block_of_pulses_give_the_same_bits(double, monkeypatch, name):
+    one, shadows = SCENES[name][0](), SCENES[name][1]
+    ask = {"tolerance": 2e-2, "seed": 3, "device": double, "shadows": shadows}
+    plan = planned_within({"few_looks": 0}, sarcl.echo, one, CHIRP, track(), **ask)
+    whole = plan.run().samples
+    monkeypatch.setattr(rough_pieces, "BLOCK", 500)
+    stay = plan.run().samples
+    monkeypatch.setattr(scene_preparation, "KEPT_PIECES", 0)
+    assert np.array_equal(plan.run().samples, stay)
+    assert np.linalg.norm(stay - whole) <= ask["tolerance"] / 4 * np.linalg.norm(whole)  # each block has its plan
+
+
+def test_pieces_on_a_device_are_not_limited_by_the_memory_for_facets(double):
+    ask = {"tolerance": 1e-2, "device": double, "shadows": False}
+    one = terrain(150)  # of as many facets and ten times as many pieces as 256 MiB hold
+    wide = sarcl.Waveform.chirp(center=9.6e9, bandwidth=9e9, duration=1e-6)
+    assert sarcl.plan(sarcl.echo, one, wide, track(1), max_bytes=1e6, **ask).plan["facets"] > 10 * 2**28 / 512
+    with pytest.raises(sarcl.ToleranceUnreachable, match="512 bytes per facet"):
+        sarcl.plan(sarcl.echo, one, wide, track(1), max_bytes=1e6, **{**ask, "device": double.without_fp64()})
+
+
+def test_more_pieces_in_shadow_than_the_host_holds_are_refused(double, monkeypatch):
+    monkeypatch.setattr(echo_request, "LEAST_HOST", 1e6)
+    plan = planned_within({"few_looks": 0}, sarcl.echo, SCENES["a box on terrain"][0](), CHIRP, track(), tolerance=2e-2,
+                          device=double, max_bytes=1e6)  # fmt: skip
+    monkeypatch.setattr(scatterers, "FACET_BYTES", 1e5)
+    with pytest.raises(MemoryError, match="shadows may fall on"):
+        plan.run()
 
 
 def test_facets_that_face_away_or_send_nothing_back_are_not_cut(double):
@@ -178,8 +244,21 @@ def test_facets_that_face_away_or_send_nothing_back_are_not_cut(double):
     assert report.contributions_done + sum(left.values()) == 8 * each
 
 
-def test_scenes_with_mirrors_and_devices_without_float64_leave_it_to_the_host(double):
-    assert RoughPieces.suits(double, terrain())
-    assert not RoughPieces.suits(double.without_fp64(), terrain())
-    assert not RoughPieces.suits(double, terrain() + sarcl.shapes.plate((1, 1)))
-    assert not RoughPieces.suits(double, replace(terrain(), triangles=terrain().triangles + 2e9, heights=None))
+def test_mirrors_and_devices_without_float64_leave_it_to_the_host(double):
+    assert RoughPieces.suited(double, terrain()).all()
+    assert not RoughPieces.suited(double.without_fp64(), terrain()).any()
+    mixed = terrain() + sarcl.shapes.plate((1, 1)) + sarcl.shapes.plate((1, 1), material=SLIGHTLY)
+    assert np.array_equal(RoughPieces.suited(double, mixed), mixed.material == 0)
+    assert not RoughPieces.suited(double, replace(terrain(), triangles=terrain().triangles + 2e9, heights=None)).any()
+
+
+def test_pieces_of_both_ways_are_all_pieces_of_a_scene(double):
+    mixed = terrain(roughness=0.02) + sarcl.shapes.plate((9, 9), material=SLIGHTLY).moved((0, 0, 2))
+    is_rough = RoughPieces.suited(double, mixed)
+    rough, host = cut(double, mixed, 0.4, 3), pieces_of(mixed, 0.4, 0.2, 3, ~is_rough)
+    whole = pieces_of(mixed, 0.4, 0.2, 3)
+    both = in_order(np.concatenate([rough.corners()[0], host.scene.triangles]))
+    assert np.array_equal(both, in_order(whole.scene.triangles)) and len(both) == len(whole)
+    on_host = ~is_rough[whole.of]
+    for name in ("of", "height", "random", "incoherent"):
+        assert np.array_equal(getattr(host, name), getattr(whole, name)[on_host])

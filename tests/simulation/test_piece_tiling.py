@@ -18,10 +18,17 @@ def test_tiles_hold_their_pieces(double, per_tile):
     x, y = np.meshgrid(axis, axis)
     one = sarcl.Scene.from_heights(axis, axis, np.sin(x / 3) * np.cos(y / 4), material=cos)
     one = one + sarcl.Scene.facets(0.1 * np.eye(3)[None], material=cos)  # not cut
-    pieces = RoughPieces.cut(double, one.moved((300.0, -2e3, 7.0)), 0.4, 0)
+    one = one.moved((300.0, -2e3, 7.0))
+    pieces = RoughPieces.cut(double, one, 0.4, 0, RoughPieces.suited(double, one))
     tiling = PieceTiling(pieces, *RoughFacets(pieces).tiling_numbers(np.array([9.6e9]), True, False))
     tiles = tiling.tiles(per_tile)
     assert tiling.tiles(per_tile) is tiles
+    brief = PieceTiling(pieces, *RoughFacets(pieces).tiling_numbers(np.array([9.6e9]), True, False), stays=False)
+    assert brief.radius == tiling.radius and tiles.planes is tiles.planes
+    for one, stays in ((tiles, True), (brief.tiles(per_tile), False)):
+        planes = one.planes
+        one.release()
+        assert (one.planes is planes) == stays
     wanted, order = tile_points(
         geometry.centroids(pieces.corners()[0]), tiling.center, per_tile, np.arange(len(pieces))
     )

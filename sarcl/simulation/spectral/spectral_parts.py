@@ -82,7 +82,9 @@ def plan_parts(task: SpectralTask, request: EchoRequest, longest: float | None =
     seen, exact = task.seen, task.variant == "exact"
     request.report("scene", 0, 3)
     prepared = prepare_scene(planned_scene(request, seen, ()), tiled=False, exact=exact)
-    steady, direct = prepared.by_light(seen.antennas, seen.waveform) if exact else (prepared.facets, None)
+    steady, direct = next(iter(prepared.facets), None), None
+    if exact:
+        steady, direct = prepared.by_light(seen.antennas, seen.waveform)
     parts, terms = [], list(prepared.shadow_terms)
     for scatterers in (prepared.points if request.same else None, steady):
         if scatterers is not None:

@@ -13,6 +13,7 @@ from sarcl.scattering.antenna_weights import weights_of
 from sarcl.scattering.physical_optics import normals_and_areas
 from sarcl.scattering.random_surface import pieces_of
 from sarcl.scattering.scatterers import ShadowRule, facets_of
+from sarcl.scattering.subdivision import CutScene
 from sarcl.simulation.spectral import _facet_factors as factors
 from sarcl.simulation.spectral._scatterer_amplitudes import ScattererAmplitudes
 from sarcl.simulation.spectral._straight_track import straight_track
@@ -45,9 +46,10 @@ def test_factors_of_facets_are_their_amplitudes(material, antenna, every_device,
     scene = sarcl.Scene.from_heights(8e3 + axis, axis, heights, material=MATERIALS[material])
     scene = scene + sarcl.shapes.box((2, 2, 3), material="metal").on(scene, 8e3, 0)
     antennas = PulseGeometry(track.positions, track.positions)
-    facets, _ = facets_of(
-        pieces_of(scene, np.inf, np.inf, 0), antennas, shadows=ShadowRule(False, True, 1e-2, max_bytes=1e9),
-        skips={"facing away"}, device=every_device, progress=lambda *_: None,
+    (facets,), _ = facets_of(
+        CutScene(scene, None, pieces_of(scene, np.inf, np.inf, 0)), antennas,
+        shadows=ShadowRule(False, True, 1e-2, max_bytes=1e9), skips={"facing away"},
+        device=every_device, progress=lambda *_: None,
     )  # fmt: skip
     weights = weights_of(*ANTENNAS[antenna], track, None, CHIRP, scene.center)
     polarizations = ("HH", "HV", "VH", "VV")
