@@ -121,8 +121,8 @@ def _sample(part: FacetSet, random: np.random.Generator) -> Sample:
 
 
 def least_pulses(spacing: int) -> int:
-    """Pulses that are enough for a cubic, and one interval beside it."""
-    return ORDER * spacing + 1
+    """Pulses that are enough for a cubic."""
+    return (ORDER - 1) * spacing + 1
 
 
 def _turning(weights: AntennaWeights, places: np.ndarray, spacing: int) -> float:
