@@ -11,7 +11,7 @@
 //                      geometry.clh
 //           in loops   p pulse, q pulse node, k tile, i vector of facets of a tile, l lane, m frequency
 //           channel    one polarisation at one frequency f_m: polarisation by polarisation, each with all f_m
-// macros    VW, FP64, BISTATIC, WRAP, TAPS, TERMS, RANGE, ORDER, GAINS, ALIKE, VARIES, CULL, SPREADING as in the headers
+// macros    VW, FP64, BISTATIC, WRAP, TAPS, TERMS, RANGE, ORDER, NEAR, GAINS, ALIKE, VARIES, CULL, SPREADING as in the headers
 //           NODES      frequencies f_m
 //           PULSE_NODES  pulses that an amplitude is interpolated from; 1: each pulse has its own
 //           HH, HV, VH, VV   1: wanted (first letter received)
@@ -140,6 +140,7 @@ __kernel void facet_amplitudes(facet_amplitudes_numbers given, __global const fl
         scattering S;
         antenna_view view = antenna_view_of(u_t, tx_range, u_r, rx_range, axes + 18 * (size_t)q, given.range);
         complex_v gain, inverse_root = c_make((fv)0.0f, (fv)0.0f), mean;
+        int coherent = is_coherent(facets + F_ROUGH * (size_t)given.n_offsets, at, given.n_offsets);
         for (int m = 0; m < NODES; m++) {
             if (m == 0 || DISPERSIVE) {
                 __global const float *root_planes = facets + (F_M + 2 * m) * (size_t)given.n_offsets;
@@ -149,7 +150,8 @@ __kernel void facet_amplitudes(facet_amplitudes_numbers given, __global const fl
             }
             __global const float *part_mean = part + (1 + 2 * m) * (size_t)given.n_offsets;
             if (PARTLY) mean = c_make(LOAD(at, part_mean), LOAD(at, part_mean + given.n_offsets));
-            else mean = triangle_mean(path_1 * nodes[m], path_2 * nodes[m]);
+            else if (coherent) mean = triangle_mean(path_1 * nodes[m], path_2 * nodes[m]);
+            else mean = c_make((fv)0.0f, (fv)0.0f);
             fv along_normal = t_dot(u_sum, normal), sum_length = max(sqrt(t_dot(u_sum, u_sum)), (fv)1e-6f);
             mean = rough_mean(mean, root_of_share, along_normal * nodes[m], along_normal / sum_length, (fv)0.5f * twice_area,
                               nodes[m], facets + F_ROUGH * (size_t)given.n_offsets, at, given.n_offsets);
@@ -180,6 +182,7 @@ static inline fv level_at(__global const uchar *levels, __global const int *mome
 
 typedef struct {
     int n, n_used, n_tiles, n_offsets, first, n_here, last, flush, stride, origin;
+    float near;
 } spread_facets_numbers;
 
 // What facets send back at a pulse node, or between two, added to profiles. global size (pulses of this call over PULSES, times
@@ -192,6 +195,7 @@ typedef struct {
 //   levels   (moments, n_tiles TILE)  r of each facet, 0 ... 255, at some moments
 //   moments  (n_used, 2)              those around a pulse, and  between (n_used)  where it lies, 0 at the one, 1 at the other
 //   axes (n_used, 18), reach, radius  see gains.clh
+//   near     m, largest radius of tiles that are so small, see NEAR
 //   last     facets in the last tile; the rest of it is blank
 //   flush    tiles added in float32 before they join the compensated total
 //   rows     (splits, n_used, CHANNELS, 2, stride, 2)   zeroed by the caller: total, its error; delay 0 at `origin`
@@ -235,8 +239,9 @@ __kernel void spread_facets(spread_facets_numbers given, __global const float *r
                     marks_near |= marks[tile_at_node[q] * (TILE / VW) + i];
                 }
                 size_t at_nearest = ((size_t)nearest_node * given.n_here + (k - given.first)) * (TILE / VW) + i;
-                tile_point x = load_tile_point(offsets, at, given.n_offsets, tile, k, given.n_tiles, 0);
-                phase_position where = locate(c, pulse, p, given.n, x);
+                offset x;
+                phase_position where = locate_in(radius[k] <= given.near, c, pulse, p, given.n, offsets, at, given.n_offsets,
+                                                 tile, k, given.n_tiles, &x);
                 uint is_facet = i * VW + VW <= n_facets ? EVERY_LANE : (1u << max(n_facets - i * VW, 0)) - 1;
                 fv inside = 1;
                 if (state == CROSSING) {

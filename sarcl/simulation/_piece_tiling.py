@@ -50,7 +50,7 @@ class PieceTiling:
         self.stride = -(-len(pieces) // largest) * largest
         self.order = np.minimum(np.arange(self.stride), len(pieces) - 1)
         placed = self._place()
-        self.radius = {n: float(self._bounds(n, placed[0])[0][3].max()) for n in PER_TILE}
+        self.radii = {n: self._bounds(n, placed[0])[0][3] for n in PER_TILE}
         self._placed: tuple[Any, Any] | None = placed if stays else None
         self._tiles: PieceTiles | None = None
 
