@@ -20,6 +20,8 @@ from sarcl.numerics.subapertures import decimated
 from sarcl.scattering.antenna_weights import AntennaWeights
 from sarcl.scattering.kept_amplitudes import SAFETY, AmplitudeSamples
 
+pytestmark = pytest.mark.filterwarnings("ignore:too few facets for speckle")  # scenes are small
+CASES = [1e-1, 1e-2, 1e-3, 1e-4]
 CHIRP = sarcl.Waveform.chirp(center=9.6e9, bandwidth=150e6, duration=1e-6)
 ROUGH = sarcl.Material(eps_r=4.0, conductivity=1e-3, height=np.inf, diagram="cos")
 
@@ -76,9 +78,7 @@ def compared(scene, track, tolerance, *, finer=20, **options):
     return raw, direct, error
 
 
-@pytest.mark.parametrize(
-    "track, tolerance", thinned([(t,) for t in TRACKS], [1e-1, 1e-2, 1e-3, 1e-4], every=4, slow=(1, 2))
-)
+@pytest.mark.parametrize("track, tolerance", thinned([(t,) for t in TRACKS], CASES, every=4, slow=(1, 2)))
 def test_rough_facets_on_every_kind_of_track(device, track, tolerance):
     raw, direct, error = compared(terrain(), TRACKS[track], tolerance, device=device)
     assert error <= 0.4 * tolerance
@@ -101,7 +101,7 @@ def test_facets_with_a_coherent_part(device):
 
 
 @pytest.mark.parametrize("turn", [0.0, 0.1])
-@pytest.mark.parametrize("tolerance", [1e-1, 1e-2])
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-3])
 def test_a_specular_flash_in_the_middle_of_the_track(device, turn, tolerance):
     raw = echoes(plate(turn), line(500, aperture=800.0), tolerance, check=True, device=device)
     assert raw.report.plan["method"] == "factorized"
@@ -177,6 +177,8 @@ def test_facets_near_the_vertical_through_an_antenna_are_refused_with_the_reason
 
 
 def test_auto_factorises_many_facets_and_the_forecast_says_so(device):
+    if not device.info.fp64:
+        pytest.skip("the host cuts the facets, and the forecast does not wait for that")
     arguments = terrain(120, 100.0), CHIRP, line(1000)
     options = {"tolerance": 1e-2, "shadows": False, "check": False, "device": device}
     forecast = sarcl.plan(sarcl.echo, *arguments, **options)
@@ -208,15 +210,15 @@ def test_the_error_of_changing_amplitudes_is_that_of_the_filter(samples):
     decimation = decimated(track, 8, 4, 2.0)
     weights = AntennaWeights(track, 9.6e9)
     assert of(0.0).change(weights, decimation, 1.0) <= 1e-12
-    errors = [of(cycles).change(weights, decimation, 1e-6) for cycles in (0.3, 1.0, 3.0)]
-    assert errors[0] < errors[1] < errors[2]
+    slow, fast = (of(cycles).change(weights, decimation, 1e-6) for cycles in (1.0, 4.0))
+    assert slow < fast / 5
     at = np.arange(40, 48)  # a block in the middle, without a cell: what the filter makes of exp(j 2 pi cycles y/80)
     y, kept_y = track.tx[:, 1], decimation.kept.tx[:, 1]
     first, row = decimation.neighbours[at].T
     near = first[:, None] + np.arange(4)
-    phasor, kept = (np.exp(2j * np.pi * 3.0 * v / 80) for v in (y[at], kept_y[near]))
+    phasor, kept = (np.exp(2j * np.pi * 4.0 * v / 80) for v in (y[at], kept_y[near]))
     change = np.abs((decimation.filter[row] * (kept - phasor[:, None])).sum(axis=1))
-    assert errors[2] == pytest.approx(SAFETY * np.sqrt((change[[2, 4, 6]] ** 2).mean() / 0.9), rel=0.2)
+    assert fast == pytest.approx(SAFETY * np.sqrt((change[[2, 4, 6]] ** 2).mean() / 0.9), rel=1e-3)
 
 
 def test_antennas_turn_on_beyond_the_ends_of_a_track():
