@@ -298,7 +298,7 @@ def test_antennas_inside_a_box_have_distance_zero():
 
 
 def test_wrong_kinds_of_argument_are_named():
-    with pytest.raises(TypeError, match=r"track is a list; wanted a sarcl\.Trajectory"):
+    with pytest.raises(TypeError, match=r"track\[0\] is a int; wanted a sarcl\.Trajectory"):
         sarcl.echo(cloud(), CHIRP, [1, 2, 3])
     with pytest.raises(TypeError, match=r"receiver is a int; wanted a sarcl\.Trajectory"):
         sarcl.echo(cloud(), CHIRP, circle(), receiver=3)

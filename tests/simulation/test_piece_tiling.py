@@ -24,7 +24,7 @@ def test_tiles_hold_their_pieces(double, per_tile):
     tiles = tiling.tiles(per_tile)
     assert tiling.tiles(per_tile) is tiles
     brief = PieceTiling(pieces, *RoughFacets(pieces).tiling_numbers(np.array([9.6e9]), True, False), stays=False)
-    assert brief.radius == tiling.radius and tiles.planes is tiles.planes
+    assert all((brief.radii[n] == tiling.radii[n]).all() for n in tiling.radii) and tiles.planes is tiles.planes
     for one, stays in ((tiles, True), (brief.tiles(per_tile), False)):
         planes = one.planes
         one.release()
