@@ -8,7 +8,9 @@ from ..opencl import fft
 from ..opencl.device import Device
 from .interpolation import Interpolator
 
-# Largest modulus of a profile: sums of ten thousand such rows still fit in complex64, of any number in complex128.
+IN_CACHE = 2**15  # samples weighted at a time, so that they stay in a cache
+
+# Largest part of a profile, real or imaginary: sums of ten thousand such rows still fit in complex64, of any number in complex128.
 TINY = 1e-35  # amplitude of samples below which pixels approach the smallest numbers of complex64
 LARGEST: dict[type[np.complexfloating], float] = {np.complex64: 1e34, np.complex128: 1e290}
 
@@ -50,26 +52,32 @@ def from_samples(
     Delay 0 stands at pad, with a `correction` among the weights at pad + length/2. The padding repeats the profile's
     other end. ValueError where samples are too large for sums in this number type.
     """
-    shaped = samples * weights
-    n, n_samples = shaped.shape
-    largest, limit = float(np.abs(shaped).max(initial=0.0)) * n_samples, LARGEST[dtype]
-    if not largest <= limit:
+    shape = n, n_samples = np.broadcast_shapes(samples.shape, np.shape(weights))
+    samples, weights = np.broadcast_to(samples, shape), np.broadcast_to(weights, shape)
+    profiles = np.empty((n, length + 2 * pad), dtype)
+    within, low, at_once = profiles[:, pad : pad + length], n_samples // 2, max(1, IN_CACHE // n_samples)
+    largest, limit = 0.0, LARGEST[dtype]
+    within[:, n_samples - low : length - low] = 0
+    for rows in (slice(start, start + at_once) for start in range(0, n, at_once)):
+        # products are written in their places, in parts that stay in a cache
+        for columns, place in ((slice(low, None), slice(n_samples - low)), (slice(low), slice(length - low, None))):
+            part = within[rows, place]
+            with np.errstate(over="ignore", invalid="ignore"):
+                np.multiply(samples[rows, columns], weights[rows, columns], out=part, casting="same_kind")
+            numbers = part.view(part.real.dtype)
+            largest = float(np.maximum(largest, np.maximum(numbers.max(initial=0.0), -numbers.min(initial=0.0))))
+    if not largest * n_samples <= limit:
         raise ValueError(
-            f"samples times weights reach {largest / n_samples:.1e} in rows of {n_samples}; sums in "
+            f"samples times weights reach {largest:.1e} in rows of {n_samples}; sums in "
             f"{dtype.__name__} hold up to {limit:.0e}: scale the samples down"
         )
-    spectrum = np.zeros((n, length), dtype)
-    low = n_samples // 2
-    spectrum[:, : n_samples - low] = shaped[:, low:]
-    if low:
-        spectrum[:, -low:] = shaped[:, :low]
-    made = fft.rows(device, spectrum, inverse=True)
-    if not pad:
-        return made
-    profiles = np.empty((n, length + 2 * pad), dtype)
-    profiles[:, pad:-pad] = made
-    profiles[:, :pad] = made[:, np.arange(-pad, 0) % length]
-    profiles[:, -pad:] = made[:, np.arange(pad) % length]
+    made = fft.rows(device, within, inverse=True, overwrite=True)
+    if not np.may_share_memory(made, within):
+        within[:] = made
+    for start in range(0, pad, length):
+        end = min(start + length, pad)
+        profiles[:, pad - end : pad - start] = profiles[:, pad - end + length : pad - start + length]
+        profiles[:, pad + length + start : pad + length + end] = profiles[:, pad + start : pad + end]
     return profiles
 
 

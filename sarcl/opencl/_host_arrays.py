@@ -23,9 +23,9 @@ class HostArrays:
         self.enqueued = self.ended = 0
         self._waiting: deque[tuple[int, np.ndarray]] = deque()
 
-    def shared(self, context: pyopencl.Context, array: np.ndarray) -> pyopencl.Buffer:
-        """A read-only buffer in the memory of `array`."""
-        return _buffer_class()(context, array, self)
+    def shared(self, context: pyopencl.Context, array: np.ndarray, writable: bool = False) -> pyopencl.Buffer:
+        """A buffer in the memory of `array`, read-only where not `writable`."""
+        return _buffer_class()(context, array, self, writable)
 
     def dropped(self, array: np.ndarray) -> None:
         """Keep an array while anything that was enqueued runs."""
@@ -49,9 +49,9 @@ def _buffer_class() -> type:
     class SharedBuffer(pyopencl.Buffer):
         """A buffer in the memory of an array; HostArrays hears when Python drops it."""
 
-        def __init__(self, context: pyopencl.Context, array: np.ndarray, arrays: HostArrays) -> None:
-            flags = pyopencl.mem_flags.READ_ONLY | pyopencl.mem_flags.USE_HOST_PTR
-            super().__init__(context, flags, hostbuf=array)
+        def __init__(self, context: pyopencl.Context, array: np.ndarray, arrays: HostArrays, writable: bool) -> None:
+            access = pyopencl.mem_flags.READ_WRITE if writable else pyopencl.mem_flags.READ_ONLY
+            super().__init__(context, access | pyopencl.mem_flags.USE_HOST_PTR, hostbuf=array)
             self.array, self.arrays = array, arrays
 
         def __del__(self) -> None:

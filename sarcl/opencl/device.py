@@ -139,6 +139,14 @@ class Device:
             memory = pyopencl.mem_flags
             return pyopencl.Buffer(self.context, memory.READ_ONLY | memory.COPY_HOST_PTR, hostbuf=array)
 
+    def output(self, array: np.ndarray) -> Buffer:
+        """A buffer of the size of a contiguous `array`, for `download` to it: on CPUs it shares the array's memory."""
+        if not self.is_cpu:
+            return self.empty(array.nbytes)
+        self._check_size(array.nbytes)
+        with explained(self.info, "a buffer", array.nbytes):
+            return self._arrays.shared(self.context, array, writable=True)
+
     def copied(self, array: np.ndarray) -> Buffer:
         """A buffer with a copy of `array`, which may change at once, and which kernels may write to."""
         buffer = self.empty(array.nbytes)
@@ -222,7 +230,12 @@ class Device:
 
         enqueued = self._arrays.enqueued
         with explained(self.info, "a copy", out.nbytes):
-            pyopencl.enqueue_copy(self.queue, out, buffer, src_offset=offset)
+            if getattr(buffer, "array", None) is out:  # of `output`: the driver puts the contents where they belong
+                read, byte = pyopencl.map_flags.READ, np.dtype(np.uint8)
+                mapped, _ = pyopencl.enqueue_map_buffer(self.queue, buffer, read, offset, (out.nbytes,), byte)
+                mapped.base.release()
+            else:
+                pyopencl.enqueue_copy(self.queue, out, buffer, src_offset=offset)
         self._ended(enqueued)
         return out
 

@@ -36,12 +36,20 @@ def good_length(n: int) -> int:
     return int(scipy.fft.next_fast_len(n))
 
 
-def rows(device: Device | None, data: np.ndarray, *, inverse: bool = False, engine: str | None = None) -> np.ndarray:
+def rows(
+    device: Device | None,
+    data: np.ndarray,
+    *,
+    inverse: bool = False,
+    engine: str | None = None,
+    overwrite: bool = False,
+) -> np.ndarray:
     """FFT of every row of complex (n, m) `data`, not normalised in either direction; the type is kept.
 
     device  None: on the host
     engine  "reikna" or "scipy"; default by the kind of device. complex128 goes to reikna only where rows are a power of
             two long: for other lengths the error is 1e-16 times the length (measured: 9e-12 at 98 304)
+    overwrite  `data` may be changed, and the result may lie there
     """
     if device is None:
         engine = "scipy"
@@ -53,8 +61,8 @@ def rows(device: Device | None, data: np.ndarray, *, inverse: bool = False, engi
 
     # norm="forward" puts the 1/m on the other direction: neither call divides
     if inverse:
-        return scipy.fft.ifft(data, axis=1, norm="forward", workers=threads())
-    return scipy.fft.fft(data, axis=1, workers=threads())
+        return scipy.fft.ifft(data, axis=1, norm="forward", workers=threads(), overwrite_x=overwrite)
+    return scipy.fft.fft(data, axis=1, workers=threads(), overwrite_x=overwrite)
 
 
 def on_device(device: Device, length: int, dtype: DTypeLike) -> bool:

@@ -111,16 +111,19 @@ class PlaneTiling(Tiling):
         height = rows.stop - rows.start
         tile_of_slot = np.empty(n_tiles, np.int32)
         tile_of_slot[np.arange(n_tiles) if slot is None else slot] = np.arange(n_tiles, dtype=np.int32)
-        image, slots = device.empty(8 * height * columns), device.upload(tile_of_slot)
+        out: np.ndarray | None = None
+        if isinstance(flat, np.ndarray) and flat.dtype == np.complex64 and flat.flags.c_contiguous:
+            if flat.shape[1] == columns:
+                out = flat[rows]
+        values = np.empty((height, columns), np.complex64) if out is None else out
+        image, slots = device.output(values), device.upload(tile_of_slot)
         numbers = {"pixels": n_tiles * self.per_tile, "across": self.across, "high": self.high, "wide": self.wide}
         launch = launch_numbers("assemble_image.cl", "untile", **numbers, columns=columns)
         untile = device.kernel("assemble_image.cl", "untile")
         device.run(untile, (columns, height), None, launch, sums, slots, image)
-        if isinstance(flat, np.ndarray) and flat.dtype == np.complex64 and flat.flags.c_contiguous:
-            if flat.shape[1] == columns:
-                device.download(image, flat[rows])
-                return
-        flat[rows, left : left + columns] = device.download(image, np.empty((height, columns), np.complex64))
+        device.download(image, values)
+        if out is None:
+            flat[rows, left : left + columns] = values
 
     def outline(self) -> np.ndarray:
         return outline(self.grid)
