@@ -23,9 +23,6 @@
 #include "interp.clh"
 #include "subaperture_shift.clh"
 
-// Record of a (tile, pulse): sample, cosine, sine, then TAPS weights.
-#define N_MOVE (4 + TAPS)
-
 typedef struct {
     int n, n_used, n_larger, n_tiles, first;
 } moves_numbers;
@@ -36,7 +33,7 @@ typedef struct {
 //   parent  (n_tiles)          which larger tile a tile lies in
 //   used    n_used <= n        pulses that are real
 //   first   this call's first tile
-//   out     (tiles of this call, n_used, N_MOVE)
+//   out     (tiles of this call, n_used, N_SHIFT)
 __kernel void moves(moves_numbers given, __global const float *restrict pulse, __global const float *restrict larger,
                     __global const float *restrict tile, __global const int *restrict parent,
                     __global const float *restrict table, __global float *restrict out) {
@@ -44,26 +41,8 @@ __kernel void moves(moves_numbers given, __global const float *restrict pulse, _
     point x = load_point(tile, k, given.n_tiles), c = x;
     if (!FROM_CENTRE) c = load_point(larger, parent[k], given.n_larger);
     subaperture_shift shift = shift_of(pulse, g, given.n, c, x);
-    fv w[TAPS], sine, cosine;
-    tap_weights(shift.z, table, w);
-    sincos_cycles(shift.cycles, &sine, &cosine);
-    int sample[VW];
-    float re[VW], im[VW], weight[TAPS][VW];
-    STORE(shift.sample, 0, sample);
-    STORE(cosine, 0, re);
-    STORE(sine, 0, im);
-#pragma unroll
-    for (int b = 0; b < TAPS; b++) STORE(w[b], 0, weight[b]);
-    out += (get_global_id(1) * (size_t)given.n_used + g * VW) * N_MOVE;
-    int count = min(VW, given.n_used - (int)g * VW);
-    for (int l = 0; l < count; l++) {
-        out[l * N_MOVE] = as_float(sample[l]);
-        out[l * N_MOVE + 1] = re[l];
-        out[l * N_MOVE + 2] = -im[l];  // exp(-j 2 pi cycles)
-        out[l * N_MOVE + 3] = 0;
-#pragma unroll
-        for (int b = 0; b < TAPS; b++) out[l * N_MOVE + 4 + b] = weight[b][l];
-    }
+    out += (get_global_id(1) * (size_t)given.n_used + g * VW) * N_SHIFT;
+    store_shifts(shift, table, min(VW, given.n_used - (int)g * VW), out);
 }
 
 // WIDTH floats of interleaved complex numbers
@@ -90,7 +69,7 @@ typedef struct {
 // global size (spans of a new profile times ITEMS, pulses, larger tiles of this call), groups of ITEMS
 //   profiles  (tiles first_tile ... last_tile - 1, n_kept, stride, 2): delay 0 of a tile stands at `reach`
 //   children  (n_larger + 1) first tile of each larger tile, those of this call from first_larger on
-//   moves     (tiles from first_tile on, n_used, N_MOVE), from `moves`
+//   moves     (tiles from first_tile on, n_used, N_SHIFT), from `moves`
 //   places    (2, pulses of the track), first kept pulse and row of the filter; those of this call begin at first_pulse
 //   filter    (rows, FILTER_TAPS): W
 //   out       (larger tiles from first_out on, n_used, n_planes, new_stride, 2): added to plane `plane`
@@ -105,12 +84,12 @@ __kernel void expand(expand_numbers given, __global const float *restrict profil
     __global const float *weight = filter + (size_t)place.y * FILTER_TAPS;
     int last = min(children[larger + 1], given.last_tile);
     for (int k = max(children[larger], given.first_tile); k < last; k++) {
-        __global const float *c = moves + ((size_t)(k - given.first_tile) * given.n_used + p) * N_MOVE;
+        __global const float *c = moves + ((size_t)(k - given.first_tile) * given.n_used + p) * N_SHIFT;
         // sample of the tile's profile that tap TAPS - 1 moves to the first new sample
         int low = begin - (given.new_origin - given.reach + as_int(c[0])) - (TAPS - 1), high = low + count + TAPS - 1;
         if (high <= 0 || low >= given.stride) continue;
         __global const float *from = profiles + 2 * ((size_t)(k - given.first_tile) * given.n_kept + place.x) * given.stride;
-        float cosine = c[1], sine = c[2];
+        float cosine = c[1], sine = c[2];  // of -2 pi kappa D_p
         for (int i = item * STEP; i < count + TAPS - 1; i += ITEMS * STEP) {
             int m = low + i;
             cv sum = 0;

@@ -23,9 +23,6 @@
 #include "interp.clh"
 #include "subaperture_shift.clh"
 
-// Record of a (new tile, pulse): first sample, then TAPS complex weights.
-#define N_SHIFT (2 + 2 * TAPS)
-
 typedef struct {
     int n_parents, n, n_used, n_tiles, first, reach, samples, stride, origin;
 } shifts_numbers;
@@ -48,29 +45,9 @@ __kernel void shifts(shifts_numbers given, __global const float *restrict pulse,
     subaperture_shift shift = shift_of(pulse, g, given.n, c, x);
     // tiles that leave their rows are kept from here by the host; no rounding may touch memory that is not the row's
     int before = given.reach - given.origin;
-    iv safe = clamp(shift.sample, (iv)before, (iv)(given.stride + before - given.samples - TAPS));
-    fv w[TAPS], sine, cosine;
-    tap_weights(shift.z, table, w);
-    sincos_cycles(shift.cycles, &sine, &cosine);
-    int sample[VW];
-    float re[TAPS][VW], im[TAPS][VW];
-    STORE(safe, 0, sample);
-#pragma unroll
-    for (int b = 0; b < TAPS; b++) {
-        STORE(w[b] * cosine, 0, re[b]);
-        STORE(w[b] * sine, 0, im[b]);
-    }
+    shift.sample = clamp(shift.sample, (iv)before, (iv)(given.stride + before - given.samples - TAPS));
     out += (get_global_id(1) * (size_t)given.n_used + g * VW) * N_SHIFT;
-    int count = min(VW, given.n_used - (int)g * VW);
-    for (int l = 0; l < count; l++) {
-        out[l * N_SHIFT] = as_float(sample[l]);
-        out[l * N_SHIFT + 1] = 0;
-#pragma unroll
-        for (int b = 0; b < TAPS; b++) {
-            out[l * N_SHIFT + 2 + 2 * b] = re[b][l];
-            out[l * N_SHIFT + 3 + 2 * b] = im[b][l];
-        }
-    }
+    store_shifts(shift, table, min(VW, given.n_used - (int)g * VW), out);
 }
 
 // WIDTH floats of interleaved complex numbers
@@ -79,25 +56,33 @@ __kernel void shifts(shifts_numbers given, __global const float *restrict pulse,
 typedef float2 cv;
 #define LOAD_CV(p) vload2(0, p)
 #define STORE_CV(v, p) vstore2(v, 0, p)
-#define TURNED(x) ((float2)(-(x).s1, (x).s0))
+#define SWAPPED(x) (x).s10
+#define IN_PAIRS(x) (x)
 #else
 #define WIDTH 8
 typedef float8 cv;
 #define LOAD_CV(p) vload8(0, p)
 #define STORE_CV(v, p) vstore8(v, 0, p)
-#define TURNED(x) ((x).s10325476 * (float8)(-1, 1, -1, 1, -1, 1, -1, 1))
+#define SWAPPED(x) (x).s10325476
+#define IN_PAIRS(x) (x).s01010101
 #endif
 
 typedef struct {
-    int stride, origin, first_parent, n_used, n_blocks, reach, first, out_first, n_kept, out_stride;
+    int stride, origin, first_parent, n_used, n_blocks, reach, first, out_first, n_kept, out_stride, n_zeroed;
 } merge_numbers;
+
+// Zeros in vectors first ... last - 1 of a profile.
+static inline void clear(__global float *restrict profile, int first, int last) {
+    for (int v = first; v < last; v++) STORE_CV((cv)0, profile + v * WIDTH);
+}
 
 // global size (spans of a profile, new tiles of this call)
 //   source     profiles (old tiles from `first_parent` on, n_used, stride, 2); delay 0 or x stands at `origin`
 //   shift      from `shifts`
 //   blocks     (n_blocks, 4): first pulse, pulses, first kept pulse, first row of `filter`
 //   filter     (rows, FILTER_TAPS): W
-//   out        (tiles from out_first on, n_kept, out_stride, 2), added to; x' stands at `reach`
+//   out        (tiles from out_first on, n_kept, out_stride, 2), added to; x' stands at `reach`; only the first n_zeroed
+//              profiles of a tile hold numbers before
 __kernel void merge(merge_numbers given, __global const float *restrict source, __global const int *restrict parent,
                     __global const float *restrict shift, __global const int *restrict blocks,
                     __global const float *restrict filter, __global float *restrict out) {
@@ -106,8 +91,10 @@ __kernel void merge(merge_numbers given, __global const float *restrict source, 
     if (!FROM_CENTRE) source += 2 * (size_t)(parent[k] - given.first_parent) * given.n_used * given.stride;
     out += (size_t)(k - given.out_first) * given.n_kept * given.out_stride * 2;
     int last = min(span + SPAN, (2 * given.out_stride + WIDTH - 1) / WIDTH);
+    int zeroed = given.n_zeroed;
     for (int b = 0; b < given.n_blocks; b++) {
         int p0 = blocks[4 * b], count = blocks[4 * b + 1], kept = blocks[4 * b + 2], row = blocks[4 * b + 3];
+        for (; zeroed < kept + FILTER_TAPS; zeroed++) clear(out + (size_t)zeroed * given.out_stride * 2, span, last);
         for (int v = span; v < last; v++) {
             cv total[FILTER_TAPS];
 #pragma unroll
@@ -116,14 +103,10 @@ __kernel void merge(merge_numbers given, __global const float *restrict source, 
                 __global const float *c = records + (size_t)(p0 + i) * N_SHIFT;
                 size_t first_sample = (size_t)(p0 + i) * given.stride + given.origin - given.reach + as_int(c[0]);
                 __global const float *s = source + 2 * first_sample + v * WIDTH;
-                cv x = 0, y = 0;
+                cv x = 0;
 #pragma unroll
-                for (int t = 0; t < TAPS; t++) {
-                    cv value = LOAD_CV(s + 2 * t);
-                    x = fma(value, (cv)c[2 + 2 * t], x);
-                    y = fma(value, (cv)c[3 + 2 * t], y);
-                }
-                x += TURNED(y);
+                for (int t = 0; t < TAPS; t++) x = fma(LOAD_CV(s + 2 * t), (cv)c[4 + t], x);
+                x = fma(SWAPPED(x), IN_PAIRS(vload2(0, c + 2)), x * (cv)c[1]);  // times exp(+j 2 pi kappa D_p)
                 __global const float *w = filter + (size_t)(row + i) * FILTER_TAPS;
 #pragma unroll
                 for (int a = 0; a < FILTER_TAPS; a++) total[a] = fma(x, (cv)w[a], total[a]);
@@ -134,5 +117,5 @@ __kernel void merge(merge_numbers given, __global const float *restrict source, 
                 STORE_CV(LOAD_CV(o) + total[a], o);
             }
         }
-    }
+    }    for (; zeroed < given.n_kept; zeroed++) clear(out + (size_t)zeroed * given.out_stride * 2, span, last);
 }

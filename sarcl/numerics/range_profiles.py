@@ -10,7 +10,8 @@ from .interpolation import Interpolator
 
 IN_CACHE = 2**15  # samples weighted at a time, so that they stay in a cache
 
-# Largest part of a profile, real or imaginary: sums of ten thousand such rows still fit in complex64, of any number in complex128.
+# Largest part of a profile, real or imaginary: sums of ten thousand such rows still fit in complex64, of any number in
+# complex128.
 TINY = 1e-35  # amplitude of samples below which pixels approach the smallest numbers of complex64
 LARGEST: dict[type[np.complexfloating], float] = {np.complex64: 1e34, np.complex128: 1e290}
 

@@ -124,7 +124,7 @@ class MemoryPlan:
 
     def tile_bytes(self, level: int) -> float:
         """Bytes per tile of a lower level: its profiles, and the records for moving profiles from the level above."""
-        records = 4 * (2 + 2 * self.plan.between.taps) * len(self.plan.levels[level - 1].decimation.kept)
+        records = 4 * (4 + self.plan.between.taps) * len(self.plan.levels[level - 1].decimation.kept)
         return float(self.plan.levels[level].n_bytes(self.strides[level]) + records)
 
     @property

@@ -99,6 +99,7 @@ class Factorized(Engine):
             packed = antennas.packed(tiling.center, plan.length, 0, len(antennas), self.lanes)
             self.kept.append(Pulses(device.upload(packed), packed.shape[2], len(antennas)))
         self.strides = [self._stride(v) for v in plan.levels]
+        self._buffers: dict[tuple[int, int], tuple[int, Buffer]] = {}
         # a root inside the range window still needs guard samples beyond the window for interpolation
         root = plan.levels[0]
         sigma = 2 * float(task.raw.frequency_step.min()) * plan.length / SPEED_OF_LIGHT
@@ -182,7 +183,7 @@ class Factorized(Engine):
         step, within, below = self.memory.at_once(tree, budget)
         edges = np.flatnonzero(np.diff(np.concatenate([[False], coverage.merged, [False]])))
         for low, high in edges.reshape(-1, 2).tolist():
-            gathered = device.zeros(8 * (high - low) * self.kept[0].n_used * self.strides[0])
+            gathered = device.empty(8 * (high - low) * self.kept[0].n_used * self.strides[0])
 
             def rows_done(rows: float, low: int = low, high: int = high) -> None:
                 on_progress((low * n_rows + (high - low) * rows / 2) / n_roots)
@@ -245,7 +246,7 @@ class Factorized(Engine):
         device, plan, task, (low, high) = self.device, self.plan, self.task, roots
         level, raw = plan.levels[0], task.raw
         nowhere = device.upload(np.zeros(len(down.tree.centers[0]), np.int32))
-        blocks, n_shift = level.decimation.blocks, 2 + 2 * plan.first.taps
+        blocks, n_shift = level.decimation.blocks, 4 + plan.first.taps
         rows = self.memory.rows(budget)
         with self.profiles.pipeline as pipeline:
             for start in range(0, raw.n_rows, rows):
@@ -265,13 +266,16 @@ class Factorized(Engine):
                 in_use = []  # on a CPU a buffer is memory of the host: it must exist until the kernel has read it
                 for tile, count, without_rows in same_coverage(left_out, low, high, step):
                     seen = cut if without_rows is None else without(cut, without_rows[start:stop])
-                    if len(seen) == 0:
+                    if len(seen) == 0 and start:
                         continue
-                    cut_buffer = device.upload(seen.astype(np.int32))
+                    cut_buffer = device.upload(seen.astype(np.int32)) if len(seen) else nowhere
                     in_use.append(cut_buffer)
                     tiles = _Tiles(0, tile, count, nowhere, cut_buffer, len(seen))
                     self._shift(down, tiles, pulses, profiles, records)
-                    self._merge(tiles, pulses, profiles, records, gathered, first_parent=0, first_out=low)
+                    n_zeroed = self.kept[0].n_used if start else 0
+                    self._merge(
+                        tiles, pulses, profiles, records, gathered, first_parent=0, first_out=low, n_zeroed=n_zeroed
+                    )
                 pipeline.step(partial(on_progress, stop))
                 clock.lap("backproject")
         clock.lap("backproject")
@@ -297,19 +301,27 @@ class Factorized(Engine):
         *,
         first_parent: int,
         first_out: int,
+        n_zeroed: int,
     ) -> None:
         """Add the profiles of the level above to the kept pulses of tiles, in a buffer that begins with `first_out`.
 
         first_parent  the tile of the level above whose profiles come first
+        n_zeroed      kept pulses that have numbers before; the others begin at zero
         """
         level = tiles.level
         numbers = {"stride": profiles.stride, "origin": profiles.origin, "first_parent": first_parent}
         numbers |= {"n_used": pulses.n_used, "n_blocks": tiles.n_blocks, "reach": self.plan.levels[level].reach}
         numbers |= {"first": tiles.first, "out_first": first_out, "n_kept": self.kept[level].n_used}
-        launch = launch_numbers(MERGE, "merge", **numbers, out_stride=self.strides[level])
+        launch = launch_numbers(MERGE, "merge", **numbers, out_stride=self.strides[level], n_zeroed=n_zeroed)
         size = (self._spans(level), tiles.count)
         buffers = profiles.buffer, tiles.parents, records, tiles.blocks, self.filters[level], merged
         self.device.run(self.merges[level][1], size, None, launch, *buffers, steps=pulses.n_used)
+
+    def _buffer(self, nbytes: int, level: int, use: int) -> Buffer:
+        """A buffer of so many bytes at least, for one use at a level: the same again, whose memory is in the caches."""
+        if self._buffers.get((level, use), (0,))[0] < nbytes:
+            self._buffers[level, use] = (nbytes, self.device.empty(nbytes))
+        return self._buffers[level, use][1]
 
     def _spans(self, level: int) -> int:
         return -(-2 * self.strides[level] // (self._span * (8 if self.lanes > 1 else 2)))
@@ -337,13 +349,13 @@ class Factorized(Engine):
         children = tree.children[level]
         every = int(children[low]), int(children[high])
         for begin, end in _runs(*every, within / self.memory.tile_bytes(below)):
-            merged = device.zeros(8 * (end - begin) * self.kept[below].n_used * self.strides[below])
-            records = device.empty(4 * (2 + 2 * plan.between.taps) * pulses.n_used * (end - begin))
+            merged = self._buffer(8 * (end - begin) * self.kept[below].n_used * self.strides[below], below, 0)
+            records = self._buffer(4 * (4 + plan.between.taps) * pulses.n_used * (end - begin), below, 1)
             n_blocks = len(plan.levels[below].decimation.blocks)
             tiles = _Tiles(below, begin, end - begin, parents, self.blocks_of[below], n_blocks)
             profiles = Profiles(source, stride, origin)
             self._shift(down, tiles, pulses, profiles, records)
-            self._merge(tiles, pulses, profiles, records, merged, first_parent=first, first_out=begin)
+            self._merge(tiles, pulses, profiles, records, merged, first_parent=first, first_out=begin, n_zeroed=0)
             self._descend(down, below, begin, end, merged, begin, within)
             if (begin, end) != every:
                 device.finish()
