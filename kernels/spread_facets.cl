@@ -11,7 +11,7 @@
 //                      geometry.clh
 //           in loops   p pulse, q pulse node, k tile, i vector of facets of a tile, l lane, m frequency
 //           channel    one polarisation at one frequency f_m: polarisation by polarisation, each with all f_m
-// macros    VW, FP64, BISTATIC, WRAP, TAPS, TERMS, RANGE, ORDER, GAINS, ALIKE, VARIES, CULL, SPREADING as in the headers
+// macros    VW, FP64, BISTATIC, WRAP, TAPS, TERMS, RANGE, ORDER, NEAR, GAINS, ALIKE, VARIES, CULL, SPREADING as in the headers
 //           NODES      frequencies f_m
 //           PULSE_NODES  pulses that an amplitude is interpolated from; 1: each pulse has its own
 //           HH, HV, VH, VV   1: wanted (first letter received)
@@ -180,6 +180,7 @@ static inline fv level_at(__global const uchar *levels, __global const int *mome
 
 typedef struct {
     int n, n_used, n_tiles, n_offsets, first, n_here, last, flush, stride, origin;
+    float near;
 } spread_facets_numbers;
 
 // What facets send back at a pulse node, or between two, added to profiles. global size (pulses of this call over PULSES, times
@@ -192,6 +193,7 @@ typedef struct {
 //   levels   (moments, n_tiles TILE)  r of each facet, 0 ... 255, at some moments
 //   moments  (n_used, 2)              those around a pulse, and  between (n_used)  where it lies, 0 at the one, 1 at the other
 //   axes (n_used, 18), reach, radius  see gains.clh
+//   near     m, largest radius of tiles that are so small, see NEAR
 //   last     facets in the last tile; the rest of it is blank
 //   flush    tiles added in float32 before they join the compensated total
 //   rows     (splits, n_used, CHANNELS, 2, stride, 2)   zeroed by the caller: total, its error; delay 0 at `origin`
@@ -235,8 +237,9 @@ __kernel void spread_facets(spread_facets_numbers given, __global const float *r
                     marks_near |= marks[tile_at_node[q] * (TILE / VW) + i];
                 }
                 size_t at_nearest = ((size_t)nearest_node * given.n_here + (k - given.first)) * (TILE / VW) + i;
-                tile_point x = load_tile_point(offsets, at, given.n_offsets, tile, k, given.n_tiles, 0);
-                phase_position where = locate(c, pulse, p, given.n, x);
+                offset x;
+                phase_position where = locate_in(radius[k] <= given.near, c, pulse, p, given.n, offsets, at, given.n_offsets,
+                                                 tile, k, given.n_tiles, &x);
                 uint is_facet = i * VW + VW <= n_facets ? EVERY_LANE : (1u << max(n_facets - i * VW, 0)) - 1;
                 fv inside = 1;
                 if (state == CROSSING) {

@@ -6,7 +6,7 @@
 // source    the echo equation of sarcl/__init__.py; type-1 nonuniform FFT in range
 // symbols   a_k          amplitude, |a|^2 = radar cross section, m^2; delta, kappa, sigma as in geometry.clh
 //           w_k(p, f)    the weight of gains.clh: antennas' gains and spreading
-// macros    VW, FP64, BISTATIC, WRAP, TAPS, TERMS, RANGE, ORDER, GAINS, ALIKE, VARIES, CULL, SPREADING as in the headers
+// macros    VW, FP64, BISTATIC, WRAP, TAPS, TERMS, RANGE, ORDER, NEAR, GAINS, ALIKE, VARIES, CULL, SPREADING as in the headers
 //           NODES     frequencies f_m
 //           TILE      scatterers per tile, a multiple of VW
 //           GROUPED   1: a work-group of 64 items adds a row up, in local memory, TILE a multiple of 64; 0: one work-item does
@@ -26,7 +26,7 @@
 
 typedef struct {
     int n, n_used, n_tiles, n_offsets, second, last, flush, stride, origin;
-    float range;
+    float range, near;
 } spread_numbers;
 
 // global size (pulses of this block over PULSES, times the group where GROUPED; splits): work-item, or group, (p, s) adds tiles
@@ -35,6 +35,7 @@ typedef struct {
 //   scatterers  (2, n_tiles TILE)    re, im of amplitude
 //   nodes       (NODES)    f_m over the patterns' frequency;  patterns, second, axes (n_used, 18), range, reach (6)   see gains.clh
 //   radius      (n_tiles)   m, of the points about their reference
+//   near        m, largest radius of tiles that are so small, see NEAR
 //   last        scatterers in the last tile; the rest of it is blank
 //   flush       tiles added in float32 before they join the compensated total
 //   rows        (splits, n_used, NODES, 2, stride, 2)   zeroed by the caller: total, its error; delay 0 at `origin`
@@ -70,8 +71,9 @@ __kernel void spread(spread_numbers given, __global const float *restrict pulse,
             if (state == INSIDE && into[r].item == 0) count[r] += n_points;
             for (int i = into[r].item; i < TILE / VW; i += ITEMS) {
                 size_t at_vector = (size_t)k * (TILE / VW) + i;
-                tile_point x = load_tile_point(offsets, at_vector, given.n_offsets, tile, k, given.n_tiles, 0);
-                phase_position at = locate(c, pulse, p, given.n, x);
+                offset x;
+                phase_position at = locate_in(radius[k] <= given.near, c, pulse, p, given.n, offsets, at_vector, given.n_offsets,
+                                              tile, k, given.n_tiles, &x);
                 fv re = LOAD(at_vector, scatterers), im = LOAD(at_vector, scatterers + given.n_offsets), inside = 1;
                 if (state == CROSSING) {
                     inside = keep_inside(c, &at);
@@ -89,7 +91,7 @@ __kernel void spread(spread_numbers given, __global const float *restrict pulse,
                 fv w[TAPS];
                 tap_weights(first_tap(at.t, at.base, given.stride, given.origin, &j), table, w);
                 fv tx_range, rx_range;
-                triple u_t = toward(from_tx, x.near, &tx_range), u_r = toward(from_rx, x.near, &rx_range);
+                triple u_t = toward(from_tx, x, &tx_range), u_r = toward(from_rx, x, &rx_range);
                 antenna_view view = antenna_view_of(u_t, tx_range, u_r, rx_range, axes + 18 * (size_t)p, given.range);
                 complex_v gain, weighted = echo;
                 for (int m = 0; m < NODES; m++) {

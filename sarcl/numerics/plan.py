@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,7 +18,23 @@ from .interpolation import Interpolator
 LEAST_TOLERANCE = 1e-6  # smallest tolerance of complex64 results
 
 FIXED = 0.8  # largest share of a tolerance for the errors of ranges and sums; the rest is for interpolation
+LEAST_TAPS = 1.0  # cost of the cheapest interpolator
 PROFILES = "float32 range profiles"
+
+
+@dataclass(frozen=True)
+class Near:
+    """Tiles of at most a radius, m, whose ranges are computed in float32, by a series of some order; 0: no tiles.
+
+    share  of the tiles that are so small
+    """
+
+    radius: float = 0.0
+    order: int = 0
+    share: float = 0.0
+
+
+NO_TILES = Near()
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +44,7 @@ class Plan:
     cost    per contribution, relative to one with the hat and ranges in float32
     native  sine and cosine are the device's own, in kernels/backproject.cl
     steps   of the high parts of directions, cycles/m, and of offsets, m: where the linear term is in two parts
+    near    tiles that are so small that float32 carries their ranges
     """
 
     interpolator: Interpolator
@@ -38,16 +56,22 @@ class Plan:
     cost: float = 1.0
     native: bool = False
     steps: tuple[float, float] = (0.0, 0.0)
+    near: Near = NO_TILES
 
     def describe(self, method: str) -> dict[str, Any]:
         """The plan in words and numbers, for a report."""
+        ranges = ("float32", "wide linear term", "wide", "linear term in two parts")[self.range_mode]
+        series = f"order {self.order}" if self.order else "exact"
+        if self.near.order:
+            tiles = f"of {100 * self.near.share:.0f} % of the tiles"
+            ranges, series = f"float32 {tiles}, else {ranges}", f"order {self.near.order} {tiles}, else {series}"
         return {
             "method": method,
             "taps": self.interpolator.taps,
             "profile samples": self.length,
             "points per tile": self.per_tile,
-            "ranges": ("float32", "wide linear term", "wide", "linear term in two parts")[self.range_mode],
-            "series": f"order {self.order}" if self.order else "exact",
+            "ranges": ranges,
+            "series": series,
         }
 
     def macros(self, bistatic: bool, wrap: bool = False) -> dict[str, int]:
@@ -59,6 +83,7 @@ class Plan:
             "TERMS": self.interpolator.terms,
             "RANGE": self.range_mode,
             "ORDER": self.order,
+            "NEAR": self.near.order,
         }
 
     def components(self, bistatic: bool, beam: bool = False) -> int:
@@ -81,6 +106,7 @@ def cheapest(
     image_gain: float = 1.0,
     gathering: cost_model.Gathering = cost_model.ON_CPU,
     native_error: float | None = None,
+    near: Mapping[int, Sequence[tuple[float, float]]] = MappingProxyType({}),
 ) -> Plan:
     """The cheapest plan whose predicted error is at most `tolerance`.
 
@@ -91,37 +117,73 @@ def cheapest(
     image_gain   factor on the interpolator's error, for scatterers on which the images of its kernel add up
     gathering    costs on the devices that follow the plan
     native_error  of their own sine and cosine, rad, which the plan takes; None: it takes polynomials
+    near         by points per tile: radii, m, and the share of the tiles that are no larger
     ToleranceUnreachable names the smallest tolerance that can be met.
     """
     best: tuple[float, Plan] | None = None
     steps = carrier_steps(carrier, n_samples, bandwidth)
+    wavenumber = 2 * frequency / SPEED_OF_LIGHT
+
+    def error(radius: float, mode: int, order: int) -> float:
+        return error_bounds.range_error(radius, distance, frequency, bandwidth, mode, order)
+
     for per_tile, radius in tiles:
-        for mode, range_cost in enumerate(gathering.range_mode):
-            for order in (2, 3, 0) if mode != 2 else (0,):
-                fixed = error_bounds.range_error(radius, distance, frequency, bandwidth, mode, order)
-                fixed += error_bounds.sum_rounding(chunk, n_samples) + (native_error or 0.0)
-                if not fixed <= FIXED * tolerance:
-                    continue
-                try:
-                    interpolator, length, cost = interpolator_choice.choose_interpolator(
-                        (tolerance - fixed) / image_gain, n_samples, points_per_row, steps, gathering
-                    )
-                except ToleranceUnreachable:  # another range mode may leave more of the tolerance to the interpolator
-                    continue
-                sigma = 2 * bandwidth / n_samples * length / SPEED_OF_LIGHT
-                if mode in (0, 3) and radius * max(sigma, 2 * frequency / SPEED_OF_LIGHT) > 2**20:
-                    continue  # positions or cycles in a tile would not fit float32
-                cost += range_cost - 1 + cost_model.TILE / per_tile
-                cost += cost_model.SERIES[order] - 1 if mode != 2 else 0.0
-                if best is None or cost < best[0]:
-                    error = fixed + image_gain * interpolator.error
-                    native = native_error is not None
-                    parts = error_bounds.two_part_steps(radius, frequency) if mode == 3 else (0.0, 0.0)
-                    best = cost, Plan(interpolator, length, per_tile, mode, order, error, cost, native, parts)
+        for ranges in _ranges(radius, near.get(per_tile, ()), gathering, error):
+            fixed = ranges.error + error_bounds.sum_rounding(chunk, n_samples) + (native_error or 0.0)
+            beside = ranges.cost + cost_model.TILE / per_tile
+            if not fixed <= FIXED * tolerance or (best and best[0] <= beside + LEAST_TAPS):
+                continue
+            try:
+                interpolator, length, cost = interpolator_choice.choose_interpolator(
+                    (tolerance - fixed) / image_gain, n_samples, points_per_row, steps, gathering
+                )
+            except ToleranceUnreachable:  # another range mode may leave more of the tolerance to the interpolator
+                continue
+            sigma = 2 * bandwidth / n_samples * length / SPEED_OF_LIGHT
+            if ranges.in_float32 * max(sigma, wavenumber) > 2**20:
+                continue  # positions or cycles in a tile would not fit float32
+            if best is None or cost + beside < best[0]:
+                parts = error_bounds.two_part_steps(radius, frequency) if ranges.mode == 3 else (0.0, 0.0)
+                best = cost + beside, Plan(
+                    interpolator, length, per_tile, ranges.mode, ranges.order, fixed + image_gain * interpolator.error,
+                    cost + beside, native_error is not None, parts, ranges.near,
+                )  # fmt: skip
     if best is None or tolerance < least_tolerance:
         reach = rounded_up(max(least_tolerance, least(n_samples, chunk, steps)))
         raise ToleranceUnreachable(tolerance, reach, PROFILES, how="in complex64")
     return best[1]
+
+
+class _Ranges(NamedTuple):
+    """A way to compute the ranges of all tiles: its error, rad, its cost beside that of the first mode, and the largest
+    radius of a tile whose positions are in float32, m."""
+
+    mode: int
+    order: int
+    near: Near
+    error: float
+    cost: float
+    in_float32: float
+
+
+def _ranges(
+    radius: float,
+    near: Sequence[tuple[float, float]],
+    gathering: cost_model.Gathering,
+    error: Callable[[float, int, int], float],
+) -> Iterator[_Ranges]:
+    """Ways to compute ranges in tiles of up to `radius` m; near, gathering  as `cheapest` takes them."""
+    series = cost_model.SERIES
+    for mode, mode_cost in enumerate(gathering.range_mode):
+        for order in (2, 3, 0) if mode != 2 else (0,):
+            cost = mode_cost - 1 + (series[order] - 1 if mode != 2 else 0.0)
+            far = error(radius, mode, order)
+            yield _Ranges(mode, order, NO_TILES, far, cost, radius if mode in (0, 3) else 0.0)
+            for limit, share in near if mode in (1, 2) else ():
+                for low in (2, 3):
+                    both = share * (series[low] - 1) + (1 - share) * cost
+                    small = Near(limit, low, share)
+                    yield _Ranges(mode, order, small, max(far, error(limit, 0, low)), both, limit)
 
 
 def carrier_steps(carrier: float, n_samples: int, bandwidth: float) -> float:

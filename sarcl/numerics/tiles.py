@@ -38,16 +38,15 @@ class Tiles:
         high, low = self.offsets.astype(np.float64).reshape(2, 3, -1, self.per_tile)
         return np.asarray(self.references[:, None] + np.moveaxis(high + low, 0, -1))
 
-    def radius_in_parts(self, n: int) -> float:
-        """Largest radius, m, of tiles of n points, of which each tile here would make several."""
-        most = 0.0
-        step = max(BLOCK // n, 1) * n
+    def radii_in_parts(self, n: int) -> np.ndarray:
+        """Radii, m, of tiles of n points, of which each tile here would make several."""
+        step, squares = max(BLOCK // n, 1) * n, []
         for first in range(0, self.offsets.shape[1], step):
             high, low = self.offsets[:, first : first + step].astype(np.float64).reshape(2, 3, -1, n)
             local = high + low
             from_middle = local - ((local.min(axis=2) + local.max(axis=2)) / 2)[:, :, None]
-            most = max(most, float(np.einsum("ijk,ijk->jk", from_middle, from_middle).max()))
-        return float(np.sqrt(most))
+            squares.append(np.einsum("ijk,ijk->jk", from_middle, from_middle).max(axis=1))
+        return np.sqrt(np.concatenate(squares))
 
     def picked(self, tiles: np.ndarray) -> Tiles:
         """These tiles only."""

@@ -299,6 +299,7 @@ class FacetSpreader:
                     KERNELS, "spread_facets", n=n, n_used=used, n_tiles=tiles.n_tiles, n_offsets=n_offsets,
                     first=first, n_here=n_block, last=tiles.last, flush=self.flush,
                     stride=self.rows.stride, origin=self.rows.stride // 2,
+                    near=np.float32(self.plan.near.radius),
                 ),
                 pulse, constants, tiles.references, tiles.offsets, made, marks, which_here, shares_here, seen,
                 moments, between, axes, self.reach, tiles.radius, self.table, sums, rows, done,

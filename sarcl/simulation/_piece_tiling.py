@@ -24,7 +24,7 @@ class PieceTiling:
         self.stride = -(-len(pieces) // largest) * largest
         self.order = np.minimum(np.arange(self.stride), len(pieces) - 1)
         self._placed: tuple[Any, Any] | None = self._place()
-        self.radius = {n: float(self._bounds(n)[0][3].max()) for n in PER_TILE}
+        self.radii = {n: self._bounds(n)[0][3] for n in PER_TILE}
         self._on_device: DeviceTiles | None = None
 
     def __len__(self) -> int:

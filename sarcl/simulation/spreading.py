@@ -22,6 +22,9 @@ from ..scattering.antenna_weights import AntennaWeights
 from .kernel_images import PatchSamples
 
 PER_TILE = (256, 64)
+# Shares of the tiles for which float32 ranges are tried where it does not carry those of the largest: neighbours along the
+# Morton curve may lie far apart, so that few tiles are many times as large as the others.
+SHARES = (0.5, 0.75, 0.9, 0.97)
 GROUP = 64  # work-items that add up a row together: ITEMS of kernels/spread_group.clh
 LOCAL = 12 * 1024  # bytes of local memory that they take, with 8 taps
 SUMS = 4  # sums of a row with vectors of lanes (kernels/spread_taps.clh)
@@ -122,13 +125,13 @@ class DeviceTiles:
 class Tiling(Protocol):
     """Scatterers that can be put into tiles on a device.
 
-    bounds  box of the positions, m (2, 3), and  center  its middle;  radius  m, the largest of the tiles of each size
+    bounds  box of the positions, m (2, 3), and  center  its middle;  radii  m, of the tiles of each size (n_tiles,)
     order   neighbours follow one another (n,)
     """
 
     bounds: np.ndarray
     center: np.ndarray
-    radius: dict[int, float]
+    radii: dict[int, np.ndarray]
     order: np.ndarray
 
     def __len__(self) -> int: ...
@@ -149,7 +152,7 @@ class HostTiling:
         largest = max(PER_TILE)
         self._tiled_largest: tuple[Tiles, np.ndarray] | None = self._tiled(largest)
         tiles = self._tiled_largest[0]
-        self.radius = {n: float(tiles.radius.max()) if n == largest else tiles.radius_in_parts(n) for n in PER_TILE}
+        self.radii = {n: tiles.radius if n == largest else tiles.radii_in_parts(n) for n in PER_TILE}
         self._on_device: DeviceTiles | None = None
 
     def __len__(self) -> int:
@@ -195,12 +198,14 @@ class TiledScatterers:
         self, antennas: PulseGeometry, band: Band, tolerance: float, least_tolerance: float = LEAST_TOLERANCE
     ) -> Plan:
         """The cheapest plan for these scatterers. ToleranceUnreachable where none meets the tolerance."""
-        n = len(self)
+        n, radii = len(self), self.tiling.radii
+        near = {size: list(zip(np.quantile(each, SHARES), SHARES, strict=True)) for size, each in radii.items()}
 
         def with_gain(gain: float) -> Plan:
             return cheapest(
                 tolerance,
-                self.tiling.radius.items(),
+                [(size, float(each.max())) for size, each in radii.items()],
+                near=near,
                 distance=antennas.distance(self.tiling.bounds),
                 frequency=float(antennas.frequency.max()) + band.bandwidth / 2,
                 bandwidth=band.bandwidth,

@@ -22,4 +22,4 @@ def test_radii_of_smaller_tiles_are_those_of_these_tiles(points):
     center = points.mean(axis=0)
     tiles, _ = tile_points(points, center, 256)
     smaller, _ = tile_points(points, center, 64)
-    assert tiles.radius_in_parts(64) == pytest.approx(float(smaller.radius.max()), rel=1e-6, abs=1e-12)
+    assert tiles.radii_in_parts(64) == pytest.approx(smaller.radius, rel=1e-6, abs=1e-12)

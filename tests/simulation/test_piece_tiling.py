@@ -29,7 +29,7 @@ def test_tiles_hold_their_pieces(double, per_tile):
     assert tiles.last < per_tile
     references = double.download(tiles.references, np.empty((2, 3, tiles.n_tiles), np.float32)).sum(axis=0, dtype=float)
     assert np.abs(references.T - wanted.references).max() < 1e-12
-    assert tiling.radius[per_tile] == pytest.approx(wanted.radius.max(), rel=1e-12)
+    assert tiling.radii[per_tile] == pytest.approx(wanted.radius, rel=1e-12)
     offsets = double.download(tiles.offsets, np.empty((6, tiles.n_offsets), np.float32))[:, : len(order)]
     # positions of 2 km round by 2e-13 m, float32 pairs of offsets in the last of 48 bits
     assert np.abs(offsets[:3].astype(float) + offsets[3:] - wanted.offsets[:3] - wanted.offsets[3:]).max() < 1e-12

@@ -121,7 +121,7 @@ class _PointKernel:
             launch_numbers(
                 "spread_points.cl", "spread", n=n, n_used=n_pulses, n_tiles=tiles.n_tiles, n_offsets=tiles.n_offsets,
                 second=self.second, range=weights.range, last=tiles.last, flush=self.flush,
-                stride=self.rows.stride, origin=self.rows.stride // 2,
+                stride=self.rows.stride, origin=self.rows.stride // 2, near=np.float32(self.plan.near.radius),
             ),
             pulse, constants, tiles.references, tiles.offsets, tiles.planes, self.ratios, self.patterns, axes,
             self.reach, tiles.radius, self.table, sums, rows, done, steps=tiles.n_tiles / splits,
