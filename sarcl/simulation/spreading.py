@@ -28,7 +28,7 @@ SHARES = (0.5, 0.75, 0.9, 0.97)
 GROUP = 64  # work-items that add up a row together: ITEMS of kernels/spread_group.clh
 LOCAL = 12 * 1024  # bytes of local memory that they take, with 8 taps
 SUMS = 4  # sums of a row with vectors of lanes (kernels/spread_taps.clh)
-TOGETHER = 8  # pulses for which a work-item adds the scatterers of a tile: rows of so many stay in a core's cache
+TOGETHER = 16  # pulses for which a work-item adds the scatterers of a tile: rows of so many stay in a core's cache
 GROUPED_ITEMS = 100_000  # work-items of a launch, of groups: more than a GPU runs at once
 
 
