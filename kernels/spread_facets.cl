@@ -140,6 +140,7 @@ __kernel void facet_amplitudes(facet_amplitudes_numbers given, __global const fl
         scattering S;
         antenna_view view = antenna_view_of(u_t, tx_range, u_r, rx_range, axes + 18 * (size_t)q, given.range);
         complex_v gain, inverse_root = c_make((fv)0.0f, (fv)0.0f), mean;
+        int coherent = is_coherent(facets + F_ROUGH * (size_t)given.n_offsets, at, given.n_offsets);
         for (int m = 0; m < NODES; m++) {
             if (m == 0 || DISPERSIVE) {
                 __global const float *root_planes = facets + (F_M + 2 * m) * (size_t)given.n_offsets;
@@ -149,7 +150,8 @@ __kernel void facet_amplitudes(facet_amplitudes_numbers given, __global const fl
             }
             __global const float *part_mean = part + (1 + 2 * m) * (size_t)given.n_offsets;
             if (PARTLY) mean = c_make(LOAD(at, part_mean), LOAD(at, part_mean + given.n_offsets));
-            else mean = triangle_mean(path_1 * nodes[m], path_2 * nodes[m]);
+            else if (coherent) mean = triangle_mean(path_1 * nodes[m], path_2 * nodes[m]);
+            else mean = c_make((fv)0.0f, (fv)0.0f);
             fv along_normal = t_dot(u_sum, normal), sum_length = max(sqrt(t_dot(u_sum, u_sum)), (fv)1e-6f);
             mean = rough_mean(mean, root_of_share, along_normal * nodes[m], along_normal / sum_length, (fv)0.5f * twice_area,
                               nodes[m], facets + F_ROUGH * (size_t)given.n_offsets, at, given.n_offsets);

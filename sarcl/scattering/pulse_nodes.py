@@ -122,8 +122,8 @@ def sample_of(part: FacetSet, random: np.random.Generator) -> Sample:
 
 
 def least_pulses(spacing: int) -> int:
-    """Pulses that are enough for a cubic, and one interval beside it."""
-    return ORDER * spacing + 1
+    """Pulses that are enough for a cubic."""
+    return (ORDER - 1) * spacing + 1
 
 
 def _turning(weights: AntennaWeights, places: np.ndarray, spacing: int) -> float:
