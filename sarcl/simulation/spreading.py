@@ -22,8 +22,8 @@ from ..scattering.antenna_weights import AntennaWeights
 from .kernel_images import PatchSamples
 
 PER_TILE = (256, 64)
-# Shares of the tiles for which float32 ranges are tried where it does not carry those of the largest: neighbours along the
-# Morton curve may lie far apart, so that few tiles are many times as large as the others.
+# Shares of the tiles for which float32 ranges are tried where it does not carry those of the largest: neighbours along
+# the Morton curve may lie far apart, so that few tiles are many times as large as the others.
 SHARES = (0.5, 0.75, 0.9, 0.97)
 GROUP = 64  # work-items that add up a row together: ITEMS of kernels/spread_group.clh
 LOCAL = 12 * 1024  # bytes of local memory that they take, with 8 taps
@@ -264,7 +264,8 @@ def _chunk(n_scatterers: int, tolerance: float) -> int:
 class Rows:
     """Rows of samples on a device, which a kernel adds scatterers to: macros of kernels/spread_rows.clh.
 
-    splits  rows of each pulse and channel, each of a share of the tiles;  grouped  work-groups add rows up, in local memory
+    splits   rows of each pulse and channel, each of a share of the tiles
+    grouped  work-groups add rows up, in local memory
     """
 
     def __init__(self, device: Device, stride: int, channels: int, n_pulses: int, n_tiles: int) -> None:
@@ -301,7 +302,7 @@ class Rows:
         return self.items * -(-n_pulses // self._pulses), self.splits
 
     def buffers(self, n_pulses: int) -> tuple[Buffer, Buffer]:
-        """Sums, which a kernel leaves at zero as it takes them, and rows, zero: (splits, pulses, channels, 2, stride)."""
+        """Sums, which a kernel finds and leaves at zero, and rows of zeros: (splits, pulses, channels, 2, stride)."""
         rows = self.splits * n_pulses * self.channels
         if self._buffer is None or self._buffer[0] < rows:
             self._buffer = None  # frees the smaller buffer first

@@ -100,7 +100,8 @@ class _PointKernel:
         self.reach = device.upload(weights.limits)
         self.flush = max(1, int(terms(spreader.tolerance) / tiles.per_tile))
         self.spectra_of = SpreadSamples(device, len(spreader.view.frequencies), plan.interpolator, plan.length)
-        per_pulse = self.tile_constants.nbytes * tiles.n_tiles + self.rows.pulse_bytes + self.spectra_of.row_bytes * n_nodes
+        per_pulse = self.tile_constants.nbytes * tiles.n_tiles + self.spectra_of.row_bytes * n_nodes
+        per_pulse += self.rows.pulse_bytes
         most, lanes = min(most_pulses(device), int(spreader.budget / 2 / per_pulse)), device.info.vector_width
         self.pulses_at_once = max(1, most // lanes) * lanes
 
