@@ -17,6 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.boxes import box, corners
 from ..base.constants import SPEED_OF_LIGHT
 from ..base.rows import spread_over
 from ..base.vectors import unit
@@ -43,6 +44,7 @@ class AmplitudeSamples:
 
     places  m (k, 3);  share  number of scatterers that each represents (k,);  amplitudes  of them
     weights  of antennas at every pulse;  frequency  the highest, Hz
+    bounds  m (2, 3), box of all scatterers
     corner  m, largest distance of a mirror's corner from its centre; 0: none reflects as a mirror
     """
 
@@ -51,6 +53,7 @@ class AmplitudeSamples:
     amplitudes: Amplitudes
     weights: AntennaWeights
     frequency: float
+    bounds: np.ndarray
     corner: float = 0.0
 
     @classmethod
@@ -64,7 +67,7 @@ class AmplitudeSamples:
         def seen(by: AntennaWeights, i: int) -> np.ndarray:
             return np.asarray(own * by.weights(places, i, frequency)[:, None])
 
-        return cls(places, share, seen, weights, frequency)
+        return cls(places, share, seen, weights, frequency, box(positions))
 
     @classmethod
     def of_facets(
@@ -78,15 +81,18 @@ class AmplitudeSamples:
         def seen(by: AntennaWeights, i: int) -> np.ndarray:
             return amplitudes_at(part, by, i, polarizations, vertical, frequency)
 
-        return cls(centroids(part.triangles), share, seen, weights, frequency, corner)
+        return cls(centroids(part.triangles), share, seen, weights, frequency, facets.bounds, corner)
 
     def change(self, source: AntennaWeights, decimation: Decimation, radius: float) -> float:
         """Error of amplitudes at the positions of `source`, interpolated between those that a decimation keeps.
 
-        radius  m, of cells. Infinite where a mirror turns so far between two kept positions that a flash may lie there.
+        radius  m, of cells. Infinite where a mirror turns so far between two kept positions that a flash may lie there,
+        or where a table of gains may end among the scatterers.
         """
         kept = source.decimated(decimation)
         if self.corner and self._turn(kept, decimation) > MOST_TURN:
+            return np.inf
+        if not self._in_tables(source) or not self._in_tables(kept):
             return np.inf
         directions = unit(np.random.default_rng(0).standard_normal(self.places.shape))
         centers = self.places - radius * directions
@@ -113,6 +119,21 @@ class AmplitudeSamples:
         ends = kept.geometry.tx[v], kept.geometry.rx[v]
         path = half_path(*ends, self.places) - half_path(*ends, centers)
         return np.asarray(np.exp(4j * np.pi * self.frequency / SPEED_OF_LIGHT * path))
+
+    def _in_tables(self, by: AntennaWeights) -> bool:
+        """Whether all scatterers lie within the tables of gains, beyond which these are 0, at every position."""
+        for pattern, ends, axes in zip(by.patterns, (by.geometry.tx, by.geometry.rx), by.axes or (), strict=False):
+            if pattern.kind != "table":
+                continue
+            look = unit(corners(self.bounds) - ends[:, None]) @ axes
+            bend = float(np.linalg.norm(np.ptp(look, axis=1), axis=1).max()) ** 2  # of the box's edges, in angles
+            azimuth = np.arctan2(look[..., 1], look[..., 0])
+            elevation = np.arctan2(look[..., 2], np.hypot(look[..., 0], look[..., 1]))
+            ratio = 1.0 if pattern.frequency is None else pattern.frequency / self.frequency
+            for angle, table in ((azimuth, pattern.azimuth), (elevation, pattern.elevation)):
+                if angle.min() - bend < ratio * table[0] or angle.max() + bend > ratio * table[-1]:
+                    return False
+        return True
 
     def _turn(self, kept: AntennaWeights, decimation: Decimation) -> float:
         """Largest change of the phase from a mirror's corner to its centre, rad, from one kept position to the next."""

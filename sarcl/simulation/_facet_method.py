@@ -18,6 +18,8 @@ from .factorized.scatterers import Channel, Scatterers
 from .factorized.spreader import FactorizedSpreader
 from .spreading import ChannelView
 
+BYTES = 250  # per facet in cells: positions, numbers for the kernel, and their copies in the order of the cells
+
 
 @dataclass(frozen=True, eq=False)
 class FacetEchoes:
@@ -46,7 +48,7 @@ def facet_echoes(
     tolerance  relative to the facets at random phases;  budget  bytes on the device
     method     "auto", "direct", or "factorized": by levels wherever that is possible
     """
-    case = _Case(tiled, facets, view, tolerance, method == "factorized")
+    case = _Case(tiled, facets, view, tolerance, budget, method == "factorized")
     levels = 'method is "direct"' if method == "direct" else case.by_levels()
     if isinstance(levels, str):
         spreader = FacetSpreader(tiled, facets, view, tolerance, budget)
@@ -76,12 +78,13 @@ class _Levels:
 
 @dataclass(frozen=True, eq=False)
 class _Case:
-    """Facets, a channel and a tolerance; forced: by levels wherever that is possible."""
+    """Facets, a channel, a tolerance and bytes on the device; forced: by levels wherever that is possible."""
 
     tiled: TiledFacets
     facets: FacetSet
     view: ChannelView
     tolerance: float
+    budget: float
     forced: bool
 
     def by_levels(self) -> _Levels | str:
@@ -94,6 +97,8 @@ class _Case:
             return "planning would take longer than it saves"
         if not self.forced and not device.is_cpu and len(antennas) < cost_model.PULSES_BESIDE_CELLS:
             return "the GPU adds these pulses before the host has made cells"
+        if not self.forced and BYTES * len(self.facets) > self.budget:
+            return "cells of so many facets take more memory than max_bytes allows"
         if passes_overhead(self.facets, view.weights, view.vertical):
             return "antennas pass over the facets, where horizontal and vertical turn fast"
         steady = np.flatnonzero(~self.facets.is_changing)

@@ -242,7 +242,7 @@ class _Case:
                     break
                 ratio = max(2, int(ratio * SMALLER_RATIO))
             if changed > most:
-                return "amplitudes change too much between neighbouring pulses"
+                return "amplitudes change too much along the track, or antennas' tables end among the scatterers"
             error, changes = error + filtered + candidate.between.error, changes + changed
             decimations.append(decimation)
             source, weights = decimation.kept, weights and weights.decimated(decimation)
