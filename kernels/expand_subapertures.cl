@@ -88,9 +88,12 @@ __kernel void expand(expand_numbers given, __global const float *restrict profil
         // sample of the tile's profile that tap TAPS - 1 moves to the first new sample
         int low = begin - (given.new_origin - given.reach + as_int(c[0])) - (TAPS - 1), high = low + count + TAPS - 1;
         if (high <= 0 || low >= given.stride) continue;
+        // new samples first_sum ... last_sum - 1 that the tile's profile reaches, in whole steps
+        int first_sum = max(0, -low - (TAPS - 1)) / STEP * STEP;
+        int last_sum = min(count, first_sum + (given.stride - low - first_sum + STEP - 1) / STEP * STEP);
         __global const float *from = profiles + 2 * ((size_t)(k - given.first_tile) * given.n_kept + place.x) * given.stride;
         float cosine = c[1], sine = c[2];  // of -2 pi kappa D_p
-        for (int i = item * STEP; i < count + TAPS - 1; i += ITEMS * STEP) {
+        for (int i = first_sum + item * STEP; i < last_sum + TAPS - 1; i += ITEMS * STEP) {
             int m = low + i;
             cv sum = 0;
             if (m >= 0 && m + STEP <= given.stride) {
@@ -110,7 +113,7 @@ __kernel void expand(expand_numbers given, __global const float *restrict profil
             }
         }
         barrier(CLK_LOCAL_MEM_FENCE);
-        for (int i = item * STEP; i < count; i += ITEMS * STEP) {
+        for (int i = first_sum + item * STEP; i < last_sum; i += ITEMS * STEP) {
             cv sum = 0;
 #pragma unroll
             for (int b = 0; b < TAPS; b++) sum = fma((cv)c[4 + b], LOAD_CV(h + 2 * (i + TAPS - 1 - b)), sum);

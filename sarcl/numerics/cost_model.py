@@ -56,9 +56,10 @@ LEAF_PIXELS = 0.1  # per contribution to a leaf tile computed pixel by pixel, on
 LEAF_POINT = 0.35  # per point and kept pulse of the smallest cells, on top of its taps
 LEAF_ROW, LEAF_SAMPLE = 10.0, 0.2  # per profile of a smallest cell, and per sample of it
 LEAF_FACET = 2.5  # per facet, channel and kept pulse: its amplitude
+LEAF_LANES = 8.0  # lanes of a profile's vectors that hold no scatterer, about
 GAIN = 4.0  # per scatterer and kept pulse, or pulse: gains of antennas, spreading loss
 EXPAND_TAP, EXPAND_FILTER_TAP = 0.012, 0.012  # per sample of a cell's profile that is moved to a pulse of a larger cell
-EXPAND_ROW = 12.0  # per such profile
+EXPAND_ROW = 24.0  # per such profile
 CELL_POINT = 70.0  # per point: cells and their tables
 # Pulses that a GPU adds directly while the host makes cells: 0.06 ns per pair, and 0.43 us per point more than tiles of
 # the direct method take (NVIDIA H100).
@@ -89,7 +90,7 @@ GRID_TAP = 0.9  # per sample and cell that it is spread over
 GRID_CELL = 1.0  # per cell and doubling of their number
 
 # Echoes of facets that are added directly, in contributions (2026-11-27).
-FACET_PAIR = 1.5  # per facet, pulse and channel, with amplitudes interpolated between pulse nodes
+FACET_PAIR = 0.8  # per facet, pulse and channel, with amplitudes interpolated between pulse nodes
 
 # Echoes of facets, per facet and pulse, in units of the first (2026-11-21).
 FACET = 1.0  # direction, position and polarisations

@@ -27,8 +27,9 @@ class EchoOptions(SceneOptions, BlockOptions):
 
     method: Literal["auto", "direct", "factorized"] = option(
         "auto",
-        '"direct": every pair of scatterer and pulse that is not skipped; "factorized": points are spread at few '
-        'antenna positions about small cells, which are joined level by level; facets directly; "auto": the cheapest',
+        '"direct": every pair of scatterer and pulse that is not skipped; "factorized": scatterers are spread at few '
+        "antenna positions about small cells, which are joined level by level; what changes too fast along the "
+        'track directly; "auto": the cheapest',
         lambda name, value: choice(name, value, METHODS),
     )
     channels: Literal["simultaneous", "separated"] = option(

@@ -217,7 +217,8 @@ class _Case:
             n_pulses = n_pulses / ratio + filter_taps
         total += n_pulses * (
             len(self.cells) * (cost_model.LEAF_POINT * cost_model.TAPS[spread.taps] + self.amplitudes.leaf)
-            + n_cells * (cost_model.LEAF_ROW + cost_model.LEAF_SAMPLE * samples)
+            + n_cells
+            * (cost_model.LEAF_ROW + cost_model.LEAF_LANES * self.amplitudes.leaf + cost_model.LEAF_SAMPLE * samples)
         )
         total = self.amplitudes.channels * total + cost_model.CELL_POINT * len(self.cells)
         return total / (len(self.cells) * len(self.antennas))
@@ -229,6 +230,7 @@ class _Case:
         for depth in candidate.depths[-2::-1]:
             levels.insert(0, self.cells.joined(depth, levels[0]))
         decimations: list[Decimation] = []
+        ratios: list[int] = []
         samples, left = self.amplitudes.samples, self.changing
         weights, changes = samples and samples.weights, 0.0
         for cells, ratio in zip(levels, candidate.ratios, strict=True):
@@ -245,6 +247,7 @@ class _Case:
                 return "amplitudes change too much along the track, or antennas' tables end among the scatterers"
             error, changes = error + filtered + candidate.between.error, changes + changed
             decimations.append(decimation)
+            ratios.append(ratio)
             source, weights = decimation.kept, weights and weights.decimated(decimation)
         error += error_bounds.sum_rounding(64, self.band.n_samples) * len(levels)
         leaf = self._leaf(candidate, levels[-1], self.tolerance - error)
@@ -254,7 +257,8 @@ class _Case:
         reaches = _reaches(levels, sigma, leaf.interpolator.taps, candidate.between.taps)
         planned = tuple(Level(*v) for v in zip(levels, decimations, reaches, strict=True))
         predicted = error + leaf.predicted_error + changes
-        return FactorizedPlan(planned, candidate.between, leaf, predicted, candidate.cost)
+        cost = self._cost(candidate.depths, candidate.spread, candidate.between, candidate.filter_taps, tuple(ratios))
+        return FactorizedPlan(planned, candidate.between, leaf, predicted, cost)
 
     def _filter_error(self, source: PulseGeometry, decimation: Decimation, cells: CellLevel) -> float:
         """Largest error of interpolation between the kept pulses, in cells where directions change fastest."""
