@@ -15,7 +15,7 @@
 //           shadow    (SHADOW,): least and largest x, least and largest y, up to five corners (x, y) anticlockwise, area
 //           corners   of a shadow: 0 where it misses the facet, COVERS where it covers all of it
 // macros    ENDS      antennas: 1 monostatic, 2 a transmitter and a receiver
-//           WAVES     wavenumbers of a launch, 0 to 4
+//           WAVES     wavenumbers of a launch, 0 to 8
 // numbers   float64 throughout: float32 cannot place points at `slack`, 1e-12 of a facet's edge, beside an edge
 // reference: sarcl/reference/lit_part.py:lit_part
 
