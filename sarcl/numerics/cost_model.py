@@ -90,7 +90,7 @@ GRID_TAP = 0.9  # per sample and cell that it is spread over
 GRID_CELL = 1.0  # per cell and doubling of their number
 
 # Echoes of facets that are added directly, in contributions (2026-11-27).
-FACET_PAIR = 0.8  # per facet, pulse and channel, with amplitudes interpolated between pulse nodes
+FACET_PAIR = 1.3  # per facet, pulse and channel, with amplitudes interpolated between pulse nodes
 
 # Echoes of facets, per facet and pulse, in units of the first (2026-11-21).
 FACET = 1.0  # direction, position and polarisations
