@@ -142,6 +142,7 @@ def fitted_lower_bound(taps: int, oversample: float) -> float:
     return float(2 * (w / 4) ** taps / math.factorial(taps) * np.cos(w / 2))
 
 
+@functools.lru_cache(maxsize=4096)  # searches of plans ask for the same spacings again and again
 def line_interpolator(taps: int, oversample: float) -> Interpolator:
     """Least-squares weights between samples `oversample` times finer than 1/bandwidth, without deconvolution.
 

@@ -165,13 +165,15 @@ def filter_error(
     usual = (blocks[spread, :1] + np.minimum(within, blocks[spread, 1:2] - 1)).ravel()
     pulses = np.unique(np.concatenate([usual, _roughest(track, decimation, centers[len(centers) // 2])]))
     block = blocks[np.searchsorted(blocks[:, 0], pulses, side="right") - 1]
-    kept = block[:, 2:3] + np.arange(decimation.filter.shape[1])
+    # the pulses of a block share their kept pulses
+    kept, tap = np.unique(block[:, 2:3] + np.arange(decimation.filter.shape[1]), return_inverse=True)
     filters, worst = decimation.filter.astype(np.float64)[block[:, 3] + pulses - block[:, 0]], 0.0
+    tap = tap.reshape(filters.shape)
     for center in centers:
         points = center + radius * directions
         exact = _phases(track, pulses, points, center, frequency)
         phases = _phases(decimation.kept, kept, points, center, frequency)
-        worst = max(worst, float(np.abs(np.einsum("pn,pnm->pm", filters, phases) - exact).max()))
+        worst = max(worst, float(np.abs(np.einsum("pn,pnm->pm", filters, phases[tap]) - exact).max()))
     return worst
 
 
