@@ -281,19 +281,6 @@ class Samples(Protocol):
         """Rows start ... stop - 1 in a buffer, which may be the one of the call before."""
 
 
-class Uploaded:
-    """Weighted samples that the host makes: `read(start, stop)` is complex64."""
-
-    row_bytes, held = 0.0, True
-
-    def __init__(self, device: Device, read: Callable[[int, int], np.ndarray]) -> None:
-        self.device, self.read = device, read
-
-    def buffer(self, pipeline: Pipeline, start: int, stop: int) -> Buffer:
-        """The samples of these rows, uploaded."""
-        return self.device.upload(self.read(start, stop))
-
-
 def tile_of(device: Device) -> int:
     """Cells per side of a tile."""
     if shared_tile.used_by(device):

@@ -160,6 +160,18 @@ def test_any_reference_and_any_centre_will_do():
         hold(moved, grid, 1e-4)
 
 
+class Uploaded:
+    """Samples that the host makes: `read(start, stop)` is complex64."""
+
+    row_bytes, held = 0.0, True
+
+    def __init__(self, device, read):
+        self.device, self.read = device, read
+
+    def buffer(self, pipeline, start, stop):
+        return self.device.upload(self.read(start, stop))
+
+
 @pytest.mark.parametrize("tile", [*nufft2d.CELLS, pytest.param(shared_tile.CELLS, marks=pytest.mark.slow)])
 def test_samples_are_spread_as_the_twin_says(device, tile, monkeypatch):
     monkeypatch.setattr(nufft2d, "CELLS", (tile, tile))
@@ -181,7 +193,7 @@ def test_samples_are_spread_as_the_twin_says(device, tile, monkeypatch):
             monkeypatch.setattr(fft, "rows", rows)
             monkeypatch.setattr(fft, "on_device", lambda *given: False)
             engine = nufft2d.Gridder(device, plan, turns, step, raw.n_samples)
-            engine.image(nufft2d.Uploaded(device, raw.read), GRID.shape, 1e9, Clock(), lambda share: None)
+            engine.image(Uploaded(device, raw.read), GRID.shape, 1e9, Clock(), lambda share: None)
             n = np.arange(90) - 45
             place = (turns[:, None] + step[:, None] * n[:, None]) % 1 * plan.length
             wanted = spread(raw.samples.ravel(), place.reshape(-1, 2), plan.interpolator, plan.length)
@@ -206,7 +218,7 @@ def test_tiles_that_a_work_group_shares_are_those_of_single_work_items(device, m
         monkeypatch.setattr(nufft2d, "tile_of", lambda device: shared_tile.CELLS)
         engine = nufft2d.Gridder(gpu, plan, turns, step, raw.n_samples)
         assert engine.blocks(57200, GRID.shape) == (1, 25)
-        engine.image(nufft2d.Uploaded(gpu, raw.read), GRID.shape, 57200, Clock(), lambda share: None)
+        engine.image(Uploaded(gpu, raw.read), GRID.shape, 57200, Clock(), lambda share: None)
     for got, wanted in zip(seen[True], seen[False], strict=True):
         assert np.array_equal(got, wanted)
 

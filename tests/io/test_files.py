@@ -197,9 +197,8 @@ def test_one_row_and_one_sample_are_kept(tmp_path, shape):
     assert same(raw.samples, sarcl.read(tmp_path / "a.h5").samples)
 
 
-def test_samples_are_copied_in_blocks_and_read_only_as_asked(tmp_path, monkeypatch):
-    monkeypatch.setattr(hdf5, "BLOCK_BYTES", 100)  # two rows of five complex64
-    raw, asked = a_raw(), []
+def test_samples_are_copied_in_blocks_and_read_only_as_asked(tmp_path):
+    raw, asked = a_raw(7, 2**20), []  # blocks of 2^24 bytes: two rows of complex64
 
     class Source:
         shape, dtype = raw.samples.shape, raw.samples.dtype
@@ -288,10 +287,9 @@ def test_an_image_returns_from_its_file_bit_by_bit(tmp_path, kind, dtype, full):
     assert arrays and not any(v.flags.writeable for v in arrays)
 
 
-def test_an_image_is_written_in_blocks_of_rows(tmp_path, monkeypatch):
-    monkeypatch.setattr(hdf5, "BLOCK_BYTES", 70)
-    data = np.arange(24, dtype=np.complex64).reshape(6, 4)
-    sarcl.Image(data, a_grid()).save(tmp_path / "a.h5")
+def test_an_image_is_written_in_blocks_of_rows(tmp_path):
+    data = np.arange(5 * 2**19, dtype=np.float32).astype(np.complex64).reshape(5, 2**19)  # blocks of four rows
+    sarcl.Image(data, sarcl.ImageGrid.plane(shape=data.shape, spacing=0.1)).save(tmp_path / "a.h5")
     assert same(sarcl.read(tmp_path / "a.h5").data, data)
 
 

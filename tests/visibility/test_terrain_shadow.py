@@ -9,7 +9,7 @@ from helpers.cases import thinned
 import sarcl
 from sarcl.scene.terrain import above
 from sarcl.scene.triangles import centroids, normals
-from sarcl.visibility._illumination_solver import IlluminationSolver
+from sarcl.visibility.illumination import lit
 
 
 def facets_of(grid):
@@ -18,7 +18,7 @@ def facets_of(grid):
 
 def shares(device, triangles, eye):
     """Shares of facets that an antenna sees from the front, uint8 (k,)."""
-    return IlluminationSolver(device, triangles, two_sided=False).share([np.array(eye, float)])
+    return lit(triangles, np.array([eye], float), two_sided=False, device=device).share(0)
 
 
 def walled(wall, n=241, size=240.0):
