@@ -15,6 +15,7 @@ For other folders:
     formed_echoes  waveform forming: echoes of many pulses from the currents of one run
     incident      a plane wave that enters through the faces of a box
     lattice       the grid: cells, positions of field components, places in buffers
+    mirrors       targets that a mirror leaves unchanged, and the anchors that then share a run
     pulse         the waveform of the incident wave, by its spectrum
     runs          one run as echoes need it: grid, cost, echoes that the currents form
     target        what a target is to the grid: lists of edges and faces
@@ -24,5 +25,4 @@ For this folder alone:
     _along_track  sums over cells at some pulses of a smooth track, interpolated at the others
     _anchor_model interpolation between anchors by their correlation, and its error
     _lists        lists of cells on a device
-    _mirrors      targets that a mirror leaves unchanged, and the anchors that then share a run
 """

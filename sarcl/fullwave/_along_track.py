@@ -71,7 +71,7 @@ def _stretches(t: np.ndarray) -> list[np.ndarray]:
     """Numbers of the pulses of each stretch."""
     parts = max(1, int(np.ceil((t[-1] - t[0]) / LONGEST)))
     number = np.minimum(((t - t[0]) / max(t[-1] - t[0], 1e-300) * parts).astype(int), parts - 1)
-    return [here for here in (np.flatnonzero(number == n) for n in range(parts)) if len(here)]
+    return [pulses for pulses in (np.flatnonzero(number == n) for n in range(parts)) if len(pulses)]
 
 
 def _terms(t: np.ndarray) -> int:
@@ -83,13 +83,13 @@ def _terms(t: np.ndarray) -> int:
 def _fit(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Numbers within a stretch of pulses to fit and of pulses to check; none to check where all are computed."""
     terms, every = _terms(t), np.arange(len(t))
-    wanted = int(np.ceil(FITTED * terms))
-    if wanted + CHECKED > WORTH * len(t):
+    n_nodes = int(np.ceil(FITTED * terms))
+    if n_nodes + CHECKED > WORTH * len(t):
         return every, every[:0]
-    nodes = chebyshev((t[0] + t[-1]) / 2, np.ptp(t), wanted)
+    nodes = chebyshev((t[0] + t[-1]) / 2, np.ptp(t), n_nodes)
     fitted = np.unique([0, len(t) - 1, *np.abs(t[:, None] - nodes).argmin(axis=0)])
-    left = np.setdiff1d(every, fitted)
-    return fitted, left[np.linspace(0, len(left) - 1, CHECKED + 2).astype(int)[1:-1]]
+    others = np.setdiff1d(every, fitted)
+    return fitted, others[np.linspace(0, len(others) - 1, CHECKED + 2).astype(int)[1:-1]]
 
 
 def _polynomials(t: np.ndarray, n_fitted: int) -> np.ndarray:

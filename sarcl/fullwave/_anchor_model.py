@@ -104,8 +104,8 @@ def _likeliest(family: str, rates: np.ndarray, place: np.ndarray, energy: np.nda
 def _solved(fit: _Fit, place: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Weights (n, P), which add up to 1, and the variance of the prediction (P,), for a unit variance."""
     n = len(place)
-    system, wanted = np.ones((n + 1, n + 1)), np.ones((n + 1, len(at)))
+    system, right_side = np.ones((n + 1, n + 1)), np.ones((n + 1, len(at)))
     system[:n, :n], system[n, n] = _correlation(fit.family, fit.rate, place), 0
-    wanted[:n] = FAMILIES[fit.family](fit.rate * (place[:, None] - at))
-    solution = np.linalg.solve(system, wanted)
-    return solution[:n], np.maximum(1 + NOISE - (solution * wanted).sum(axis=0), 0)
+    right_side[:n] = FAMILIES[fit.family](fit.rate * (place[:, None] - at))
+    solution = np.linalg.solve(system, right_side)
+    return solution[:n], np.maximum(1 + NOISE - (solution * right_side).sum(axis=0), 0)

@@ -140,8 +140,8 @@ class _Work:
         self.run(np.array([pulse]))
         own = self.got[pulse][near]
         energy = (np.abs(own) ** 2).sum()
-        found = np.sqrt((np.abs(guess - own) ** 2).sum() / energy)
-        self.checks.append(Check(pulse, float(np.sqrt(expected * near.sum() / energy)), float(found)))
+        error = np.sqrt((np.abs(guess - own) ** 2).sum() / energy)
+        self.checks.append(Check(pulse, float(np.sqrt(expected * near.sum() / energy)), float(error)))
 
     def result(self) -> Anchored:
         return Anchored(self.samples, self.pulses, self.predicted_error, self.history, self.checks)
@@ -155,5 +155,5 @@ def _equispaced(along: np.ndarray, number: int) -> np.ndarray:
 
 def _nearest(along: np.ndarray, share: np.ndarray) -> np.ndarray:
     """Numbers of the pulses nearest to shares of the arc, each once."""
-    wanted = along[0] + share * (along[-1] - along[0])
-    return np.unique(np.abs(along[:, None] - wanted).argmin(axis=0))
+    places = along[0] + share * (along[-1] - along[0])
+    return np.unique(np.abs(along[:, None] - places).argmin(axis=0))

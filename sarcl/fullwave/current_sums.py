@@ -92,13 +92,13 @@ def _by_component(currents: Currents) -> list[tuple[int, np.ndarray, Callable[[s
     for magnetic, (at, values) in enumerate(((currents.edges, currents.electric), (currents.faces, currents.magnetic))):
         offset, component = currents.lattice.positions(at, bool(magnetic)) - currents.centre, at // size
         for a in range(3):
-            here = np.flatnonzero(component == a)
-            out.append((a + 3 * magnetic, offset[here], _taken(values, here)))
+            cells = np.flatnonzero(component == a)
+            out.append((a + 3 * magnetic, offset[cells], _taken(values, cells)))
     return out
 
 
-def _taken(values: np.ndarray, here: np.ndarray) -> Callable[[slice], np.ndarray]:
-    return lambda cells: np.take(values, here[cells], axis=1)
+def _taken(values: np.ndarray, index: np.ndarray) -> Callable[[slice], np.ndarray]:
+    return lambda cells: np.take(values, index[cells], axis=1)
 
 
 def _is_linear(paths: Paths, reach: float) -> bool:

@@ -113,12 +113,12 @@ def sample_period(pulse: Pulse, omega: np.ndarray, time_step: float) -> int:
     every n-th step holds, beside the frequency that is asked for, those that differ by multiples of 1/(n dt). It is
     the sum over all steps, over n, where the pulse has nothing there (ALIAS).
     """
-    wanted = omega / (2 * np.pi)
-    here = np.abs(pulse.spectrum(wanted))
+    frequency = omega / (2 * np.pi)
+    spectrum = np.abs(pulse.spectrum(frequency))
     for every in PERIODS:
         shift = np.arange(1, every)[:, None] / (every * time_step)
-        there = wanted + np.concatenate([shift, -shift])
-        if (np.abs(pulse.spectrum(np.abs(there))).sum(axis=0) <= ALIAS * here).all():
+        alias = frequency + np.concatenate([shift, -shift])
+        if (np.abs(pulse.spectrum(np.abs(alias))).sum(axis=0) <= ALIAS * spectrum).all():
             return every
     return 1
 

@@ -47,13 +47,13 @@ def grid_omega(lattice: Lattice, k: np.ndarray, direction: np.ndarray) -> np.nda
 def wavenumber(lattice: Lattice, omega: np.ndarray, direction: np.ndarray) -> np.ndarray:
     """Wavenumbers, rad/m (n,), of waves of angular frequencies omega (n,) along `direction`."""
     dt = lattice.time_step
-    wanted = 2 / (SPEED_OF_LIGHT * dt) * np.sin(np.asarray(omega) * dt / 2)
-    k = wanted * np.ones_like(np.asarray(direction)[..., :1])
+    length = 2 / (SPEED_OF_LIGHT * dt) * np.sin(np.asarray(omega) * dt / 2)
+    k = length * np.ones_like(np.asarray(direction)[..., :1])
     for _ in range(STEPS):
         vector = grid_vector(lattice, k, direction)
         slope = _along(lattice, vector, k, direction)  # of |K|^2/2
-        k -= ((vector**2).sum(axis=-1) - wanted**2) / (2 * np.where(slope == 0, 1, slope))
-    if (np.abs((grid_vector(lattice, k, direction) ** 2).sum(axis=-1) - wanted**2) > 1e-9 * wanted**2).any():
+        k -= ((vector**2).sum(axis=-1) - length**2) / (2 * np.where(slope == 0, 1, slope))
+    if (np.abs((grid_vector(lattice, k, direction) ** 2).sum(axis=-1) - length**2) > 1e-9 * length**2).any():
         raise ValueError(
             f"frequency {np.max(omega) / (2 * np.pi):.4g} Hz is above what cells of {lattice.cell:.3g} m carry; "
             "use smaller cells"
@@ -64,8 +64,8 @@ def wavenumber(lattice: Lattice, omega: np.ndarray, direction: np.ndarray) -> np
 def fields(vector: np.ndarray, polarization: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """E and H, unit vectors (n, 3), of plane waves with K (n, 3): E is `polarization` (3,) less its part along K."""
     unit = vector / np.linalg.norm(vector, axis=-1, keepdims=True)
-    wanted = polarization[..., None, :]
-    e = wanted - unit * (unit * wanted).sum(axis=-1, keepdims=True)
+    across = polarization[..., None, :]
+    e = across - unit * (unit * across).sum(axis=-1, keepdims=True)
     e = e / np.linalg.norm(e, axis=-1, keepdims=True)
     return e, np.cross(unit, e)
 

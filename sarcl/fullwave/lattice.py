@@ -44,14 +44,14 @@ class Lattice:
             )
         row = nz + LANES
         plane = (ny + 1) * row
-        made = {
+        derived = {
             "origin": array("origin", self.origin, np.float64, (3,)),
             "row": row,
             "plane": plane,
             "component": LANES + (nx + 2) * plane + row,
             "start": LANES + plane + row,
         }
-        for name, value in made.items():
+        for name, value in derived.items():
             object.__setattr__(self, name, value)
         if 3 * self.component >= 2**31:
             raise ValueError(

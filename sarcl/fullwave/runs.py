@@ -11,8 +11,6 @@ from ..base.constants import SPEED_OF_LIGHT
 from ..base.vectors import unit
 from ..opencl.device import Device
 from ._lists import PARTS, SAMPLES
-from ._mirrors import Twin as Twin
-from ._mirrors import mirror_axes, mirrored_echoes, twins
 from .bodies.materials import RIM as RIM
 from .bodies.materials import Body, bodies
 from .currents import currents
@@ -20,6 +18,7 @@ from .fields import WAVE_STEPS
 from .formed_echoes import formed_echoes
 from .incident import COMPONENTS, SPACING, PlaneWave
 from .lattice import COURANT, LANES, ROWS, Lattice
+from .mirrors import Twin, mirror_axes, mirrored_echoes, twins
 from .pulse import Pulse
 from .target import Target
 
@@ -167,7 +166,7 @@ def mirror_twins(
 ) -> dict[int, Twin]:
     """For pulses, the pulse that the run of their anchor serves too, by a mirror that leaves the target unchanged.
 
-    tx, sent  positions of the transmitter, m, and polarisations, unit vectors (P, 3);  k, radius  as `_mirrors:twins`
+    tx, sent  positions of the transmitter, m, and polarisations, unit vectors (P, 3);  k, radius  as `mirrors:twins`
     """
     return twins(mirror_axes(lattice, target), unit(tx - centre_of(lattice)), sent, k, radius)
 
@@ -186,14 +185,14 @@ def run(
     tolerance  part of the currents that may come after the end of the run
     """
     place, sent = anchor
-    found = currents(
+    sources = currents(
         device, lattice, target, PlaneWave(centre_of(lattice) - place, sent, _pulse(band)), k, absorber=ABSORBER,
         gap=GAP, tolerance=tolerance, most_steps=most_steps, progress=progress,
     )  # fmt: skip
-    echoes = [formed_echoes(device, found, tx, rx, received, max_bytes=max_bytes)]
+    echoes = [formed_echoes(device, sources, tx, rx, received, max_bytes=max_bytes)]
     if twin is not None:
-        echoes.append(mirrored_echoes(device, found, twin, tx, rx, received, max_bytes=max_bytes))
-    return echoes, RunEnd(found.n_steps, found.left)
+        echoes.append(mirrored_echoes(device, sources, twin, tx, rx, received, max_bytes=max_bytes))
+    return echoes, RunEnd(sources.n_steps, sources.left)
 
 
 def _pulse(band: tuple[float, float]) -> Pulse:

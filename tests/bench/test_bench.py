@@ -174,7 +174,6 @@ def test_competitors_take_turns_and_long_ones_fewer():
 def test_runs_wait_for_an_idle_machine_but_not_for_ever(monkeypatch):
     ticks = iter([(0, 100), (10, 200), (10, 200), (105, 300)])  # 10 % idle, then 95 %
     monkeypatch.setattr(_wait_idle, "_idle_and_all", lambda: next(ticks))
-    monkeypatch.setattr(_wait_idle, "LOOK", 0.0)
     assert _wait_idle.wait(60)
     busy = itertools.count(0, 100)
     monkeypatch.setattr(_wait_idle, "_idle_and_all", lambda: (0, next(busy)))

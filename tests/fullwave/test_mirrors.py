@@ -7,12 +7,12 @@ import pytest
 from helpers.fdtd_cases import conductor_on_grid, sphere_intervals
 
 from sarcl.fullwave import runs
-from sarcl.fullwave._mirrors import Twin, mirror_axes, mirrored_echoes, twins
 from sarcl.fullwave.bodies.cut_cells import conductor
 from sarcl.fullwave.currents import currents
 from sarcl.fullwave.formed_echoes import formed_echoes
 from sarcl.fullwave.incident import PlaneWave
 from sarcl.fullwave.lattice import Lattice
+from sarcl.fullwave.mirrors import Twin, mirror_axes, mirrored_echoes, twins
 from sarcl.fullwave.target import material_edges
 from sarcl.scattering.physical_optics import polarisation
 

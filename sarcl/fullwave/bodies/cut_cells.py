@@ -203,8 +203,8 @@ def _around(inside: np.ndarray, free: np.ndarray, axis: int, at: np.ndarray) -> 
         place = node.copy()
         for along in steps:
             place[along] += 1
-        held = (place < np.array(inside.shape)[:, None]).all(axis=0)
-        return np.asarray(np.where(held, values[tuple(np.where(held, place, 0))], values.dtype.type(beyond)))
+        is_inside = (place < np.array(inside.shape)[:, None]).all(axis=0)
+        return np.asarray(np.where(is_inside, values[tuple(np.where(is_inside, place, 0))], values.dtype.type(beyond)))
 
     corners = np.stack([moved(inside, steps, 0) for steps in ((), (b,), (c,), (b, c))])
     edges = ((free[c], (b,)), (free[c], ()), (free[b], (c,)), (free[b], ()))
@@ -216,9 +216,9 @@ def _free_area(corner: np.ndarray, lengths: np.ndarray) -> np.ndarray:
     c_high, c_low, b_high, b_low = lengths
     along_b, along_c = (b_low, b_low, b_high, b_high), (c_low, c_high, c_low, c_high)  # the edges that meet a corner
     n = corner.sum(axis=0)
-    outside = sum(np.where(held, 0, lb * lc / 2) for held, lb, lc in zip(corner, along_b, along_c, strict=True))
+    outside = sum(np.where(inside, 0, lb * lc / 2) for inside, lb, lc in zip(corner, along_b, along_c, strict=True))
     covered = sum(
-        np.where(held, (1 - lb) * (1 - lc) / 2, 0) for held, lb, lc in zip(corner, along_b, along_c, strict=True)
+        np.where(inside, (1 - lb) * (1 - lc) / 2, 0) for inside, lb, lc in zip(corner, along_b, along_c, strict=True)
     )
     across_b, across_c = (b_low + b_high) / 2, (c_low + c_high) / 2  # two corners inside, side by side: a trapezoid
     two = np.where(corner[0] == corner[1], across_c, np.where(corner[0] == corner[2], across_b, 1 - covered))

@@ -42,15 +42,15 @@ def bodies(lattice: Lattice, parts: Sequence[Body], k: float | None = None, reac
     for i, part in enumerate(parts):
         _check_passive(i, part.permittivity)
     metal = [part.triangles for part in parts if part.permittivity is None]
-    made, found = Target.nothing(), None
+    metals, lines = Target.nothing(), None
     if metal:
-        found = mesh_lines(lattice, np.concatenate(metal), reach)
-        along_x, along_y, along_z = found.intervals
-        found = replace(found, intervals=(_with_nodes(along_x, found.strips), along_y, along_z))
-        made = conductor(lattice, found.intervals, found.areas)
-        made = replace(made, gap=found.gap, strip_area=found.strip_area)
+        lines = mesh_lines(lattice, np.concatenate(metal), reach)
+        along_x, along_y, along_z = lines.intervals
+        lines = replace(lines, intervals=(_with_nodes(along_x, lines.strips), along_y, along_z))
+        metals = conductor(lattice, lines.intervals, lines.areas)
+        metals = replace(metals, gap=lines.gap, strip_area=lines.strip_area)
     if len(metal) == len(parts):
-        return made
+        return metals
     wavenumber, fine, dielectric = number("k", k, above=0), halved(lattice), []
     for i, part in enumerate(parts):
         if part.permittivity is not None:
@@ -58,11 +58,11 @@ def bodies(lattice: Lattice, parts: Sequence[Body], k: float | None = None, reac
             value = on_grid(lattice, part.permittivity, wavenumber)
             dielectric.append((_named(f"parts[{i}]", fine, part.triangles).intervals, value))
     hidden = mesh_lines(fine, np.concatenate(metal), 2 * reach).intervals if metal else None
-    made_of = _dielectric_edges(lattice, dielectric, hidden, found, wavenumber)
+    insulators = _dielectric_edges(lattice, dielectric, hidden, lines, wavenumber)
     return Target(
-        np.concatenate([made.edges, made_of.edges]), np.concatenate([made.share, made_of.share], axis=1),
-        made.faces, made.weight, made.resting, made.gap, made.strip_area, made_of.coupled, made_of.coupling,
-        made_of.lagging, made_of.keep,
+        np.concatenate([metals.edges, insulators.edges]), np.concatenate([metals.share, insulators.share], axis=1),
+        metals.faces, metals.weight, metals.resting, metals.gap, metals.strip_area,
+        insulators.coupled, insulators.coupling, insulators.lagging, insulators.keep,
     )  # fmt: skip
 
 
@@ -111,14 +111,14 @@ def _dielectric_edges(
     box = Box.around(lattice, [_joined(group) for group in by_axis])
     free = edge_lengths(box, metal.intervals)[1] if metal is not None else None
     places, values, across = [], [], []
-    for axis, found in enumerate(permittivities(box, parts, hidden)):
-        outside = np.ones(len(found.at), bool) if free is None else free[axis].flat[found.at] > 0
-        places.append(box.in_grid(lattice, found.at[outside], axis))
-        values.append(found.values[outside])
-        across.append(found.across[:, outside])
+    for axis, edges in enumerate(permittivities(box, parts, hidden)):
+        outside = np.ones(len(edges.at), bool) if free is None else free[axis].flat[edges.at] > 0
+        places.append(box.in_grid(lattice, edges.at[outside], axis))
+        values.append(edges.values[outside])
+        across.append(edges.across[:, outside])
     at, value, coupling = np.concatenate(places), np.concatenate(values), np.concatenate(across, axis=1)
-    made = material_edges(lattice, at, value.real, conductivities(lattice, value, k))
-    some = np.abs(coupling).max(axis=0, initial=0) > 0
-    weights, lagging, keep = lagging_weights(lattice, coupling[:, some], k)
-    own = made.share[1][some]
-    return replace(made, coupled=at[some], coupling=weights * own, lagging=lagging * own, keep=keep)
+    target = material_edges(lattice, at, value.real, conductivities(lattice, value, k))
+    is_coupled = np.abs(coupling).max(axis=0, initial=0) > 0
+    weights, lagging, keep = lagging_weights(lattice, coupling[:, is_coupled], k)
+    own = target.share[1][is_coupled]
+    return replace(target, coupled=at[is_coupled], coupling=weights * own, lagging=lagging * own, keep=keep)

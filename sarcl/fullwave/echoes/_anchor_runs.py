@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...base.errors import warn
-from ..runs import RunEnd, Twin
+from ..mirrors import Twin
+from ..runs import RunEnd
 from ._anchor_files import AnchorFiles
 from ._fullwave_task import FullwaveTask
 from ._run_progress import RunProgress

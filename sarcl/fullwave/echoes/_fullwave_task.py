@@ -24,6 +24,7 @@ from ...scene.scene import Scene
 from ...simulation import echo_sampling
 from .. import runs
 from ..lattice import Lattice
+from ..mirrors import Twin
 from ..target import Target
 from ._antenna_geometry import angle_along, check_outside, window_of
 from ._closed_bodies import check_bodies, check_wavelengths, losses_said, parts_of
@@ -173,7 +174,7 @@ class FullwaveTask:
         return [slice(first, min(first + each, n)) for first in range(0, n, each)]
 
     @cached_property
-    def twins(self) -> dict[str, dict[int, runs.Twin]]:
+    def twins(self) -> dict[str, dict[int, Twin]]:
         """For each polarisation that is sent, and for pulses, the pulse that the run of their anchor serves too, by
         mirror symmetry."""
         radius = float(np.linalg.norm(self.scene.bounds[1] - self.scene.bounds[0])) / 2
@@ -190,7 +191,7 @@ class FullwaveTask:
         received: list[str],
         pulses: np.ndarray,
         progress: RunProgress,
-        twin: runs.Twin | None = None,
+        twin: Twin | None = None,
     ) -> tuple[list[np.ndarray], runs.RunEnd]:
         """Echoes (n, Q, F) at some pulses (n,), formed from the currents of an anchor at one pulse, phase zero at the
         centre, and from those of its twin, where one is given; and how the runs ended.
