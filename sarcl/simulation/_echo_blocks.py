@@ -23,7 +23,8 @@ from .scene_echoes import Added, SceneEchoes
 # options that change nothing, or nothing but rounding; entries of the description with a name of their own
 OF_A_RUN = {"device", "cluster", "progress", "out", "resume", "tile", "max_bytes", "check"}
 NAMED = ("method", "tolerance", "polarization", "seed", "skip")
-LEAST_BYTES = 2.0**20  # of the samples of a block: smaller ones take longer to write, and checksums cover as much
+# of a block: fewer bytes of samples take longer to write, unless its contributions take about a second
+LEAST_BYTES, LEAST_CONTRIBUTIONS = 2.0**22, 1e8
 UNIT = 64  # pulses: a block begins at a multiple of so many, which fill the lanes of every device
 
 
@@ -72,7 +73,8 @@ class EchoEngine:
     @property
     def least(self) -> float:
         """Pulses of a block, at least: also so that its samples are worth a file."""
-        return max(float(self.method.least(self.scene)), LEAST_BYTES / (8.0 * float(np.prod(self.bands.shape[1:]))))
+        worth = min(LEAST_BYTES / (8.0 * np.prod(self.bands.shape[1:])), LEAST_CONTRIBUTIONS / max(self.passes, 1))
+        return max(float(self.method.least(self.scene)), float(worth))
 
     def blocks(self, nbytes: float) -> list[Run]:
         """See Engine: no block needs more of the device than another."""
