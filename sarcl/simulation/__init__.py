@@ -27,12 +27,11 @@ For this folder alone:
     _echo_blocks       echoes as a job that is computed in blocks of pulses
     _echo_forecast     rows, bytes, seconds and errors of a plan of echoes, before the work
     _echo_plan         the plan of echoes, and its run
-    _echo_work         how much work echoes are, by the numbers of pieces and pulses
     _exact_facets      few facets in few pulses and samples, added up in float64 on the host
     _facet_method      the method of echoes of facets: factorised, directly, or both
     _facet_spreading   facets to range profiles
     _piece_tiling      pieces of rough facets in tiles, on the device that cut them
-    _planned_echoes    the method of echoes, and the plan of the scene for it
+    _planned_echoes    the method of echoes, the plan of the scene for it, and how much work they are
     _single_channel    echoes of one transmitting and one receiving antenna
     _unseen_scene      refusal of scenes outside every beam or range window, before anything is planned
 """

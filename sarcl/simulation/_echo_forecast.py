@@ -24,8 +24,7 @@ from ..base.text import duration
 from ..blocks.workers import speedup
 from ..model.phase_history import PhaseHistory
 from ..numerics import cost_model
-from ._echo_work import EchoWork
-from ._planned_echoes import Method, PlannedEchoes
+from ._planned_echoes import EchoWork, Method, PlannedEchoes
 from ._single_channel import SingleEchoes
 from .echo_output import bytes_of
 from .echo_task import EchoTask

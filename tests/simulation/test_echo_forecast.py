@@ -13,7 +13,7 @@ import sarcl
 from sarcl.base.errors import NothingSeen
 from sarcl.base.report import root_sum_square
 from sarcl.simulation import _planned_echoes as planned_echoes
-from sarcl.simulation._echo_work import pieces_of
+from sarcl.simulation._planned_echoes import pieces_of
 from sarcl.simulation._single_channel import SingleEchoes
 from sarcl.simulation.spectral import _spectral_plan
 
