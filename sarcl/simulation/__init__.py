@@ -17,6 +17,7 @@ For other folders:
     spreading          plan, tiles and sums that points and facets share
     track_options      options that every verb of echoes shares
     channels/          echoes of the channels of an array
+    facets/            echoes of facets, directly or factorised
     factorized/        scatterers spread about small cells at few antenna positions, and cells joined level by level
     points/            echoes of points, directly or factorised
     spectral/          spectral_echo(): echoes of straight tracks by Fourier transforms
@@ -27,10 +28,6 @@ For this folder alone:
     _echo_blocks       echoes as a job that is computed in blocks of pulses
     _echo_forecast     rows, bytes, seconds and errors of a plan of echoes, before the work
     _echo_plan         the plan of echoes, and its run
-    _exact_facets      few facets in few pulses and samples, added up in float64 on the host
-    _facet_method      the method of echoes of facets: factorised, directly, or both
-    _facet_spreading   facets to range profiles
-    _piece_tiling      pieces of rough facets in tiles, on the device that cut them
     _planned_echoes    the method of echoes, the plan of the scene for it, and how much work they are
     _single_channel    echoes of one transmitting and one receiving antenna
     _unseen_scene      refusal of scenes outside every beam or range window, before anything is planned

@@ -12,7 +12,7 @@ from ..numerics.pulse_geometry import PulseGeometry
 from ..scattering.antenna_weights import AntennaWeights
 from ..scattering.facets import FacetSet, Light
 from ..scattering.scatterers import Points
-from ._exact_facets import facet_samples, inside_window
+from .facets.exact_facets import facet_samples, inside_window
 from .scene_echoes import SceneEchoes
 from .spreading import ChannelView
 

@@ -18,11 +18,11 @@ from ..scattering.antenna_weights import AntennaWeights, WeightError
 from ..scattering.facets import FacetSet
 from ..scattering.scatterers import Points
 from ..scattering.subdivision import Subdivision
-from ._exact_facets import ExactFacets
-from ._facet_method import facet_echoes
-from ._facet_spreading import FacetSpreader, TiledFacets
 from ._unseen_scene import OUTSIDE_BEAM, OUTSIDE_WINDOW
 from .echo_request import EchoRequest
+from .facets.exact_facets import ExactFacets
+from .facets.facet_method import facet_echoes
+from .facets.facet_spreading import FacetSpreader, TiledFacets
 from .factorized.spreader import FactorizedSpreader
 from .points.direct import PointSpreader
 from .points.point_plan import PointPlan, PreparedPoints

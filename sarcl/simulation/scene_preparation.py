@@ -15,8 +15,8 @@ from ..scattering.rough_pieces import PIECE_BYTES, RoughFacets
 from ..scattering.scatterers import Points, ShadowRule, facets_of, points_of
 from ..scattering.subdivision import Subdivision
 from ..scene.scene import Scene
-from ._facet_spreading import TiledFacets
 from .echo_request import EchoRequest
+from .facets.facet_spreading import TiledFacets
 from .points.point_plan import PreparedPoints
 from .scene_echoes import SceneEchoes
 from .scene_plan import SHADOWS, ScenePlan, parts_of, samples_shadows, with_clipped_shadows

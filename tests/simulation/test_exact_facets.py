@@ -12,7 +12,7 @@ from sarcl.reference import facet
 from sarcl.scattering.antenna_weights import AntennaWeights
 from sarcl.scattering.facet_plan import FacetPlan
 from sarcl.scattering.facets import FacetSet
-from sarcl.simulation._exact_facets import ExactFacets
+from sarcl.simulation.facets.exact_facets import ExactFacets
 from sarcl.simulation.spreading import ChannelView
 
 

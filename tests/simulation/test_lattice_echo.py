@@ -11,7 +11,8 @@ from sarcl import shapes
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.numerics import cost_model
 from sarcl.reference.equations import point_echo as exact_echo
-from sarcl.simulation import _facet_spreading, echo_check, kernel_images
+from sarcl.simulation import echo_check, kernel_images
+from sarcl.simulation.facets import facet_spreading
 from sarcl.simulation.points import direct
 
 CHIRP = sarcl.Waveform.chirp(center=9.6e9, bandwidth=200e6, duration=1e-6)
@@ -89,7 +90,7 @@ def test_few_scatterers_take_the_plan_for_the_worst_case_and_sample_no_patches(m
 
 
 def test_random_phases_of_rough_ground_need_neither(monkeypatch):
-    monkeypatch.setattr(_facet_spreading, "sample_patches", None)
+    monkeypatch.setattr(facet_spreading, "sample_patches", None)
     monkeypatch.setattr(cost_model, "PATCHES", 0.0)
     rough = sarcl.Material(eps_r=4.0, height=np.inf, diagram="cos")
     track = sarcl.Trajectory.line(start=(8e3, 0, 6e3), velocity=(0, 10, 0), prf=100.0, n_pulses=4)

@@ -9,7 +9,7 @@ import sarcl
 from sarcl.numerics.tiles import tile_points
 from sarcl.scattering.rough_pieces import RoughFacets, RoughPieces
 from sarcl.scene import triangles as geometry
-from sarcl.simulation._piece_tiling import PieceTiling
+from sarcl.simulation.facets._piece_tiling import PieceTiling
 
 
 @pytest.mark.parametrize("per_tile", [64, 256])

@@ -9,25 +9,24 @@ from typing import Any
 
 import numpy as np
 
-from ..base.constants import SPEED_OF_LIGHT
-from ..base.stage_timer import Clock
-from ..model.waveform import Waveform
-from ..numerics import range_profiles
-from ..numerics.device_profiles import SpreadSamples
-from ..numerics.pulse_geometry import PulseGeometry
-from ..numerics.tile_constants import TileConstants
-from ..opencl.launch_numbers import launch_numbers
-from ..scattering.antenna_weights import AntennaWeights
-from ..scattering.facet_plan import FacetPlan
-from ..scattering.facets import POLARIZATIONS, FacetSet, diagram_macros, vertical_axes
-from ..scattering.pulse_nodes import every, plan_pulse_nodes
-from ..scattering.rough_pieces import RoughFacets
-from ..scene.triangles import centroids
-from ..visibility.illumination import Span
-from ._piece_tiling import PieceTiling
-from .echo_request import EchoRequest
-from .kernel_images import PatchSamples, sample_patches
-from .spreading import (
+from ...base.constants import SPEED_OF_LIGHT
+from ...base.stage_timer import Clock
+from ...model.waveform import Waveform
+from ...numerics import range_profiles
+from ...numerics.device_profiles import SpreadSamples
+from ...numerics.pulse_geometry import PulseGeometry
+from ...numerics.tile_constants import TileConstants
+from ...opencl.launch_numbers import launch_numbers
+from ...scattering.antenna_weights import AntennaWeights
+from ...scattering.facet_plan import FacetPlan
+from ...scattering.facets import POLARIZATIONS, FacetSet, diagram_macros, vertical_axes
+from ...scattering.pulse_nodes import every, plan_pulse_nodes
+from ...scattering.rough_pieces import RoughFacets
+from ...scene.triangles import centroids
+from ...visibility.illumination import Span
+from ..echo_request import EchoRequest
+from ..kernel_images import PatchSamples, sample_patches
+from ..spreading import (
     ChannelView,
     Counts,
     HostTiling,
@@ -37,6 +36,7 @@ from .spreading import (
     most_pulses,
     terms,
 )
+from ._piece_tiling import PieceTiling
 
 KERNELS = "spread_facets.cl"
 MOST_PULSES = 256  # pulses per block where amplitudes are interpolated: two blocks cannot share their nodes

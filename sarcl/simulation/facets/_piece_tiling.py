@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from ..base import float_pairs
-from ..opencl.launch_numbers import launch_numbers
-from ..scattering.rough_pieces import KERNELS, RoughPieces, in_groups
-from .spreading import PER_TILE, DeviceTiles
+from ...base import float_pairs
+from ...opencl.launch_numbers import launch_numbers
+from ...scattering.rough_pieces import KERNELS, RoughPieces, in_groups
+from ..spreading import PER_TILE, DeviceTiles
 
 BUFFERS = "references", "radius", "offsets", "planes"  # of DeviceTiles
 

@@ -6,17 +6,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.constants import SPEED_OF_LIGHT
-from ..numerics import cost_model
-from ..numerics.plan import Plan
-from ..scattering.facets import POLARIZATIONS, FacetSet, diagram_macros, vertical_axes
-from ..scattering.kept_amplitudes import AmplitudeSamples, passes_overhead
-from ._facet_spreading import FacetSpreader, TiledFacets
-from .factorized.cells import ScattererCells, scatterers_in_window
-from .factorized.levels import FEWEST_PULSES, Amplitudes, FactorizedPlan, plan_levels
-from .factorized.scatterers import Channel, Scatterers
-from .factorized.spreader import FactorizedSpreader
-from .spreading import ChannelView
+from ...base.constants import SPEED_OF_LIGHT
+from ...numerics import cost_model
+from ...numerics.plan import Plan
+from ...scattering.facets import POLARIZATIONS, FacetSet, diagram_macros, vertical_axes
+from ...scattering.kept_amplitudes import AmplitudeSamples, passes_overhead
+from ..factorized.cells import ScattererCells, scatterers_in_window
+from ..factorized.levels import FEWEST_PULSES, Amplitudes, FactorizedPlan, plan_levels
+from ..factorized.scatterers import Channel, Scatterers
+from ..factorized.spreader import FactorizedSpreader
+from ..spreading import ChannelView
+from .facet_spreading import FacetSpreader, TiledFacets
 
 BYTES = 250  # per facet in cells: positions, numbers for the kernel, and their copies in the order of the cells
 

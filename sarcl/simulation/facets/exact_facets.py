@@ -7,16 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from ..base.constants import SPEED_OF_LIGHT
-from ..base.stage_timer import Clock
-from ..base.vectors import unit
-from ..numerics.error_bounds import FLOAT32
-from ..numerics.pulse_geometry import PulseGeometry
-from ..scattering.facet_plan import FacetPlan
-from ..scattering.facets import FacetSet, Light
-from ..scattering.physical_optics import lit_share, turned
-from ..scene.triangles import centroids, normals
-from .spreading import ChannelView, Counts
+from ...base.constants import SPEED_OF_LIGHT
+from ...base.stage_timer import Clock
+from ...base.vectors import unit
+from ...numerics.error_bounds import FLOAT32
+from ...numerics.pulse_geometry import PulseGeometry
+from ...scattering.facet_plan import FacetPlan
+from ...scattering.facets import FacetSet, Light
+from ...scattering.physical_optics import lit_share, turned
+from ...scene.triangles import centroids, normals
+from ..spreading import ChannelView, Counts
 
 AT_ONCE = 200_000  # amplitudes computed per block of frequencies
 
