@@ -305,7 +305,7 @@ class Rows:
         return self.items * -(-n_pulses // self._pulses), self.splits
 
     def buffers(self, n_pulses: int) -> tuple[Buffer, Buffer]:
-        """Sums, which a kernel leaves at zero as it takes them, and rows of zeros (splits, pulses, channels, 2, stride)."""
+        """Sums, which a kernel finds and leaves at zero, and rows of zeros: (splits, pulses, channels, 2, stride)."""
         rows = self.splits * n_pulses * self.channels
         if self._buffer is None or self._buffer[0] < rows:
             self._buffer = None  # frees the smaller buffer first

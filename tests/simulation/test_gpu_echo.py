@@ -48,7 +48,7 @@ def with_and_without_groups(device):
     """GPUs whose work-groups add up scatterers together, and without local memory for that."""
     gpu = as_gpu(device)
     gpus = {True: gpu, False: Device(replace(gpu.info, local_memory=0), gpu._raw)}
-    assert all(spreading.is_grouped(gpu) is grouped for grouped, gpu in gpus.items())
+    assert all(spreading.Rows(gpu, 64, 1, 1, 1).grouped is grouped for grouped, gpu in gpus.items())
     return gpus
 
 
@@ -125,6 +125,6 @@ def test_facets_that_work_groups_add_up_are_those_of_single_work_items(device, o
 def test_groups_are_at_least_100_000_work_items(device, n_pulses):
     for units in (8, 132):
         gpu = Device(replace(device.info, kind="gpu", units=units), device._raw)
-        parts = spreading.splits(gpu, n_pulses, 10**6, grouped=True)
+        parts = spreading.Rows(gpu, 64, 1, n_pulses, 10**6).splits
         assert min(n_pulses, spreading.most_pulses(gpu)) * parts * spreading.GROUP >= 100_000
-    assert spreading.splits(gpu, 1, 7, grouped=True) == 7
+    assert spreading.Rows(gpu, 64, 1, 1, 7).splits == 7
