@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sarcl.base import constants, float_pairs
-from sarcl.numerics import cost_model, error_bounds, interpolation, interpolator_choice, nufft2d, range_profiles
+from sarcl.numerics import cost_model, error_bounds, interpolation, interpolator_choice, nufft2d, plan, range_profiles
 from sarcl.numerics.interpolation import fitted, interpolator
 
 
@@ -175,3 +175,15 @@ def test_images_keep_off_the_carrier(error, carrier):
     nearest = np.abs(carrier - length * np.arange(1, carrier / length + 2)).min()
     assert nearest >= 0.25 * length
     assert length <= 1.6 * interpolator_choice.choose_interpolator(error, 64, 1e6)[1]
+
+
+def test_tiles_that_float32_carries_are_computed_in_it_and_their_error_counts():
+    problem = {"distance": 1e4, "frequency": 9.7e9, "bandwidth": 150e6, "n_samples": 300, "points_per_row": 10**6}
+    tiles = [(256, 175.0)]
+    alone = plan.cheapest(1e-2, tiles, chunk=10**4, **problem)
+    made = plan.cheapest(1e-2, tiles, chunk=10**4, near={256: [(4.0, 0.9), (20.0, 0.98)]}, **problem)
+    assert alone.near.order == 0 and made.near.radius == 20.0 and made.cost < alone.cost - 0.5
+    assert (made.range_mode, made.order) == (alone.range_mode, alone.order)
+    float32 = error_bounds.range_error(20.0, 1e4, 9.7e9, 150e6, 0, made.near.order)
+    assert made.predicted_error - made.interpolator.error > float32 > 1e-3
+    assert "float32 of 98 % of the tiles" in made.describe("spread")["ranges"]
