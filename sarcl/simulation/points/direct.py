@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -55,10 +54,6 @@ class PointSpreader:
     tolerance: float
     budget: float
 
-    @functools.cached_property
-    def _kernel(self) -> _PointKernel:
-        return _PointKernel(self)
-
     def add(
         self, samples: np.ndarray, pulses: Sequence[int], clock: Clock, on_progress: Callable[[int], object]
     ) -> Counts:
@@ -66,7 +61,7 @@ class PointSpreader:
 
         on_progress is called with the number of pairs of point and pulse that are done.
         """
-        kernel, n_nodes = self._kernel, len(self.nodes)
+        kernel, n_nodes = _PointKernel(self), len(self.nodes)
         basis = lagrange(self.nodes, self.view.frequencies).astype(np.float32)
         clock.lap("scene")
         counts, first, end = Counts(), pulses[0], pulses[-1] + 1
@@ -105,9 +100,8 @@ class _PointKernel:
         self.reach = device.upload(weights.limits)
         self.flush = max(1, int(terms(spreader.tolerance) / tiles.per_tile))
         self.spectra_of = SpreadSamples(device, len(spreader.view.frequencies), plan.interpolator, plan.length)
-        per_pulse = (
-            self.tile_constants.nbytes * tiles.n_tiles + self.rows.pulse_bytes + self.spectra_of.row_bytes * n_nodes
-        )
+        per_pulse = self.tile_constants.nbytes * tiles.n_tiles + self.spectra_of.row_bytes * n_nodes
+        per_pulse += self.rows.pulse_bytes
         most, lanes = min(most_pulses(device), int(spreader.budget / 2 / per_pulse)), device.info.vector_width
         self.pulses_at_once = max(1, most // lanes) * lanes
 
