@@ -95,6 +95,8 @@ class _Case:
             return f"the track has {len(antennas)} pulses, and {FEWEST_PULSES} are the fewest that are decimated"
         if len(self.facets) * len(antennas) < least:
             return "planning would take longer than it saves"
+        if not self.forced and not self.tiled.stays:
+            return "all pieces together take more than the memory for them"
         if not self.forced and not device.is_cpu and len(antennas) < cost_model.PULSES_BESIDE_CELLS:
             return "the GPU adds these pulses before the host has made cells"
         if not self.forced and BYTES * len(self.facets) > self.budget:

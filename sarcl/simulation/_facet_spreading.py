@@ -60,7 +60,7 @@ class TiledFacets(TiledScatterers):
         """antennas, waveform, weights  of all channels: samples of patches are computed for them
         stays  False: pieces that a device cuts do not stay on it
         """
-        device = request.device
+        device, self.stays = request.device, stays
         self.of = lambda some: TiledFacets(request, some, plan, antennas, waveform, weights)
         self.facets, self.facet_plan, nodes = facets, plan, plan.nodes
         self.metal = all(np.isinf(m.conductivity) for m in facets.materials)
