@@ -25,11 +25,13 @@ class EchoLimits:
     """Where plans of echoes change their way.
 
     few_looks         pairs of piece and pulse, up to which rough facets are clipped too: about ten seconds
+    most_looks        such pairs, up to which they are clipped where samples do not meet the tolerance: about a minute
     prepared_share    of the modelled job, and
     prepared_seconds  s: a forecast may take the larger of these to prepare the scene
     """
 
     few_looks: float = 2e6
+    most_looks: float = 5e7
     prepared_share: float = 0.06
     prepared_seconds: float = 0.035
 

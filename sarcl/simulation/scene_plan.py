@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -112,10 +112,25 @@ def share_of(request: EchoRequest, seen: SeenScene, tolerance: float) -> float:
 
 def samples_shadows(request: EchoRequest, seen: SeenScene) -> bool:
     """Whether shadows on rough facets are counted in samples."""
+    return request.shadows and bool(len(seen.scene.triangles)) and _looks(request, seen) > request.limits.few_looks
+
+
+def _looks(request: EchoRequest, seen: SeenScene) -> float:
     cell = np.inf if request.max_edge is None else cell_edge(seen.waveform)
-    n_facets = len(seen.scene.triangles)
-    few = request.limits.few_looks
-    return request.shadows and bool(n_facets) and rough_looks(seen.scene, cell, len(seen.antennas)) > few
+    return rough_looks(seen.scene, cell, len(seen.antennas))
+
+
+def with_clipped_shadows(plan: ScenePlan) -> ScenePlan | None:
+    """The plan by which lit parts of rough facets are computed, not counted in samples; None where these are too
+    many."""
+    limits = plan.request.limits
+    if _looks(plan.request, plan.seen) > limits.most_looks:
+        return None
+    request = replace(plan.request, limits=replace(limits, few_looks=np.inf))
+    try:
+        return planned_scene(request, plan.seen, plan.bands)
+    except ToleranceUnreachable:  # the host does not hold the pieces
+        return None
 
 
 def plan_scene(

@@ -19,7 +19,7 @@ from ._facet_spreading import TiledFacets
 from .echo_request import EchoRequest
 from .points.point_plan import PreparedPoints
 from .scene_echoes import SceneEchoes
-from .scene_plan import SHADOWS, ScenePlan, parts_of, samples_shadows
+from .scene_plan import SHADOWS, ScenePlan, parts_of, samples_shadows, with_clipped_shadows
 
 LEAST = 1e-30  # largest amplitude of a scene below which echoes approach the smallest numbers of complex64
 LARGEST = 1e30  # amplitude whose sums and spectra still fit in complex64
@@ -35,8 +35,24 @@ def prepare_scene(plan: ScenePlan, *, tiled: bool = True, exact: bool = True) ->
 
     tiled  False: no scatterers are put on the device, for callers that do not spread them into range profiles
     exact  False: shadows on facets are shares, by sampled rays
-    ToleranceUnreachable where these cannot meet the tolerance; NothingSeen where no scatterer is left.
+    ToleranceUnreachable where these cannot meet the tolerance, and the pieces are too many to be clipped; NothingSeen
+    where no scatterer is left.
     """
+    try:
+        return _prepared(plan, tiled=tiled, exact=exact)
+    except _TooFewSamples:
+        clipped = with_clipped_shadows(plan) if exact else None
+        if clipped is None:
+            raise
+    return _prepared(clipped, tiled=tiled, exact=exact)
+
+
+class _TooFewSamples(ToleranceUnreachable):
+    """Shadows that are counted in samples do not meet the tolerance."""
+
+
+def _prepared(plan: ScenePlan, *, tiled: bool, exact: bool) -> SceneEchoes:
+    """As `prepare_scene`, with shadows as they are planned."""
     request, seen, weights = plan.request, plan.seen, plan.seen.weights
     if "out of beam" in request.skips:
         weights = weights.culled(UNSEEN * plan.error_budget / plan.weight_error.peak_to_rms, seen.waveform)
@@ -136,7 +152,7 @@ def _shadow_terms(request: EchoRequest, scene: Scene, facets: Sequence[FacetSet]
         return ()
     share, light = SHADOWS / parts_of(scene), lights[0]  # one for all
     if light.error > share * request.tolerance:
-        raise ToleranceUnreachable(
+        raise _TooFewSamples(
             request.tolerance,
             askable(rounded_up(1.05 * light.reached / share)),
             "shadow edges on rough facets, counted in samples at single pulses",

@@ -61,11 +61,12 @@ TRACKS = {
 }
 
 
-def echo(scene, track, few, tolerance, **options):
+def echo(scene, track, few, tolerance, most=None, **options):
     tx, receiver = track
     window = {"range_window": (-15, 15), "reference": scene.center}
     options |= {"receiver": receiver, "tolerance": tolerance, "seed": 3, **window}
-    return planned_within({"few_looks": few}, sarcl.echo, scene, CHIRP, tx, **options).run()
+    limits = {"few_looks": few, "most_looks": few if most is None else most}
+    return planned_within(limits, sarcl.echo, scene, CHIRP, tx, **options).run()
 
 
 @pytest.mark.parametrize("name, track", thinned(SCENES, TRACKS))
@@ -158,6 +159,13 @@ def test_a_tolerance_that_samples_cannot_meet_is_refused_with_the_best():
     best = refused.value.best
     assert best == float(f"{best:.1e}")  # two digits: it can be typed as it is printed
     assert echo(scene, track, 0, best, max_edge=1.0).report.predicted_error <= best
+
+
+def test_lit_parts_are_computed_where_samples_do_not_meet_a_tolerance():
+    scene, track = SCENES["hills"](), TRACKS["bistatic"]
+    raw, wanted = (echo(scene, track, few, 3e-5, most=np.inf, max_edge=1.0) for few in (0, np.inf))
+    assert np.array_equal(raw.samples, wanted.samples)
+    assert "shadow edges" not in raw.report.plan and raw.report.predicted_error <= 3e-5
 
 
 def test_little_memory_for_shares_changes_nothing():
