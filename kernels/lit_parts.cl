@@ -16,12 +16,13 @@
 //           corners   of a shadow: 0 where it misses the facet, COVERS where it covers all of it
 // macros    ENDS      antennas: 1 monostatic, 2 a transmitter and a receiver
 //           WAVES     wavenumbers of a launch, 0 to 8
+//           PARTS     covered parts of an edge that are listed at once: few on GPUs, so that they stay in registers
 // numbers   float64 throughout: float32 cannot place points at `slack`, 1e-12 of a facet's edge, beside an edge
 // reference: sarcl/reference/lit_part.py:lit_part
 
 #include "receiver_axes.clh"
 
-enum { SHADOW = 15, COVERS = 255, SLIVER = 300, COVERED_PARTS = 16 };
+enum { SHADOW = 15, COVERS = 255, SLIVER = 300 };
 
 typedef struct { double x, y; } point;
 
@@ -166,16 +167,29 @@ static inline void put_part(double *begins, double *stops, int *n, double *known
         *s = to;
         return;
     }
-    if (at == COVERED_PARTS) {
+    if (at == PARTS) {
+        double latest = begins[0];
         at = 0;
-        for (int i = 1; i < COVERED_PARTS; i++)
-            if (begins[i] > begins[at]) at = i;
-        *known = min(*known, max(from, begins[at]));
-        if (from >= begins[at]) return;
+#pragma unroll
+        for (int i = 1; i < PARTS; i++)
+            if (begins[i] > latest) {
+                latest = begins[i];
+                at = i;
+            }
+        *known = min(*known, max(from, latest));
+        if (from >= latest) return;
     } else
         *n = at + 1;
-    begins[at] = from;
-    stops[at] = to;
+    if (PARTS < 8) {  // every index is constant
+#pragma unroll
+        for (int i = 0; i < PARTS; i++) {
+            begins[i] = i == at ? from : begins[i];
+            stops[i] = i == at ? to : stops[i];
+        }
+    } else {
+        begins[at] = from;
+        stops[at] = to;
+    }
 }
 
 enum { CLOSE_INVERSE = 10000, SMALL_INVERSE = 100 };  // 1/rad: below these differences, and phases, series hold to 1e-10
@@ -257,7 +271,7 @@ __kernel void lit_parts(lit_parts_numbers given, __global const double *restrict
                 double low_x = min(a.x, a.x + d.x) - r[19], high_x = max(a.x, a.x + d.x) + r[19];
                 double low_y = min(a.y, a.y + d.y) - r[19], high_y = max(a.y, a.y + d.y) + r[19];
                 while (s < end) {  // up to `known`, all parts of the edge that shadows cover are listed
-                    double begins[COVERED_PARTS], stops[COVERED_PARTS], known = end;
+                    double begins[PARTS], stops[PARTS], known = end;
                     int parts = 0;
                     for (int e_2 = 0; e_2 < ENDS; e_2++)
                         for (int k = begin; k < stop; k++) {
@@ -278,11 +292,12 @@ __kernel void lit_parts(lit_parts_numbers given, __global const double *restrict
                         while (moved && s < known) {
                             moved = 0;
                             until = known;
-                            for (int i = 0; i < parts; i++)
-                                if (begins[i] <= s && stops[i] > s) {
+#pragma unroll
+                            for (int i = 0; i < (PARTS < 8 ? PARTS : parts); i++)
+                                if (i < parts && begins[i] <= s && stops[i] > s) {
                                     s = stops[i];
                                     moved = 1;
-                                } else if (begins[i] > s)
+                                } else if (i < parts && begins[i] > s)
                                     until = min(until, begins[i]);
                         }
                         if (s >= known) break;

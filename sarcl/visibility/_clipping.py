@@ -15,6 +15,7 @@ from ._certain_shadows import COVERED, UNDECIDED, certain_shadows
 from ._shadow_pairs import PAIRS_AT_ONCE
 
 KERNELS = "lit_parts.cl"
+PARTS = {True: 16, False: 4}  # covered parts of an edge that are listed at once, by whether the device is a CPU
 SHADOW = 15  # numbers of a shadow, as in the kernels
 # Wavenumbers per launch, on CPUs and on other devices: GPUs keep the sums of no more in registers
 MOST_WAVES = 8, 1
@@ -159,7 +160,8 @@ class Clipper:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Shares (n_pulses, n) and means (n_pulses, n, m) of facets `which`, of whose pairs these are the occluders."""
         device, n_pairs = self.device, max(len(occluder), 1)
-        cast = device.kernel(KERNELS, "cast_shadows", ENDS=antennas.shape[1], WAVES=0)
+        macros = {"ENDS": antennas.shape[1], "PARTS": PARTS[device.is_cpu]}
+        cast = device.kernel(KERNELS, "cast_shadows", WAVES=0, **macros)
         receivers = device.upload(facets.packed(which, self.origin, self.on_plane))
         (pulses, ends), seen = antennas.shape[:2], device.upload(antennas)
         size = pulses * ends * n_pairs
@@ -176,7 +178,7 @@ class Clipper:
         share = np.empty((pulses, len(which)), np.float32)
         most = MOST_WAVES[not device.is_cpu]
         for some in np.split(waves, range(most, len(waves), most)):
-            light = device.kernel(KERNELS, "lit_parts", ENDS=antennas.shape[1], WAVES=len(some))
+            light = device.kernel(KERNELS, "lit_parts", WAVES=len(some), **macros)
             mean = np.empty((pulses, len(which), len(some)), np.complex64)
             out = device.empty(share.nbytes), device.empty(max(mean.nbytes, 8))
             device.run(

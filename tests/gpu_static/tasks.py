@@ -86,6 +86,17 @@ def spectral(tolerance: float, **options: Any) -> Any:
     )  # fmt: skip
 
 
+def rough_pieces() -> Any:
+    """Rough facets without shadows, which the device cuts."""
+    axis = np.linspace(-8, 8, 17)
+    heights = np.random.default_rng(0).normal(size=(17, 17)) * 0.02
+    scene = sarcl.Scene.from_heights(axis, axis, heights, material=sarcl.Material(eps_r=4.0, diagram="cos2"))
+    chirp = sarcl.Waveform.chirp(center=9.6e9, bandwidth=150e6, duration=0.5e-6)
+    return sarcl.echo(
+        scene, chirp, sarcl.Trajectory.circle(radius=5e3, height=3e3, arc=0.02, n_pulses=8), shadows=False
+    )
+
+
 def full_wave(material: Any = "metal", cells: float = 10, **options: Any) -> Any:
     """A sphere, each pulse with a run of its own or formed from one run."""
     angle = np.deg2rad([20.0, 21, 22, 23, 24, 25, 26, 27])
@@ -127,6 +138,7 @@ OWN: dict[str, Callable[[], Any]] = {
     "range_doppler": lambda: range_doppler(1e-2),
     "spectral_echo": lambda: spectral(1e-2),
     "spectral_echo rough": lambda: spectral(1e-2, roughness=0.01),
+    "echo rough pieces": rough_pieces,
     "fullwave_echo": lambda: full_wave(anchors=2),
     "fullwave_echo dielectric": lambda: full_wave(sarcl.Material(eps_r=3.0), 12, anchors=2),
     "antenna beam": antenna_beam,
