@@ -113,7 +113,7 @@ POINTINGS = {name: getattr(sarcl.pointing, name) for name in ("spotlight", "stri
 ANTENNAS = {name: getattr(sarcl.Antenna, name) for name in ("isotropic", "rectangular", "gaussian", "table")}
 ARRAYS = {name: getattr(sarcl.AntennaArray, name) for name in ("linear", "planar", "costas")}
 GRIDS = {name: getattr(sarcl.ImageGrid, name) for name in ("plane", "points", "on_terrain", "zero_doppler")}
-SHAPES = {name: getattr(sarcl.shapes, name) for name in ("box", "sphere", "cylinder", "plate", "tank")}
+SHAPES = {name: getattr(sarcl.shapes, name) for name in "plate disc box cylinder cone frustum sphere tank".split()}
 SCENES = {name: getattr(sarcl.Scene, name) for name in ("points", "from_mesh", "from_heights", "from_dem", "facets")}
 VERBS = {verb: {"": getattr(sarcl, verb)} for verb in ("echo", "spectral_echo", "fullwave_echo", "backproject")}
 VERBS |= {verb: {"": getattr(sarcl, verb)} for verb in ("polar_format", "range_doppler")}
@@ -142,8 +142,10 @@ def test_the_keys_are_those_of_the_python_signatures(section):
         assert names - kinds - {"on"} == wanted
 
 
-def test_every_section_is_one_of_those():
+def test_every_section_and_every_part_of_a_scene_is_one_of_those():
     assert known_names("[qqqq]\n") == {*CALLS}
+    assert known_names("[[scene.qqqq]]\n") == {*SCENES, *SHAPES}
+    assert known_names("[grid.qqqq]\n") == {*GRIDS}
 
 
 def test_the_verbs_get_their_tables_as_arguments_and_the_caller_has_the_last_word(monkeypatch):
