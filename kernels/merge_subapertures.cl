@@ -73,6 +73,7 @@ typedef struct {
 
 // Zeros in vectors first ... last - 1 of a profile.
 static inline void clear(__global float *restrict profile, int first, int last) {
+#pragma unroll 1
     for (int v = first; v < last; v++) STORE_CV((cv)0, profile + v * WIDTH);
 }
 
@@ -117,5 +118,6 @@ __kernel void merge(merge_numbers given, __global const float *restrict source, 
                 STORE_CV(LOAD_CV(o) + total[a], o);
             }
         }
-    }    for (; zeroed < given.n_kept; zeroed++) clear(out + (size_t)zeroed * given.out_stride * 2, span, last);
+    }
+    for (; zeroed < given.n_kept; zeroed++) clear(out + (size_t)zeroed * given.out_stride * 2, span, last);
 }

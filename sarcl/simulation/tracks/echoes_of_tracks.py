@@ -100,7 +100,7 @@ class EchoesOfTracks:
         )
 
     def run(self) -> list[PhaseHistory]:
-        """The echoes of all tracks. An exception names the track that it is of.
+        """The echoes of all tracks. An exception names the track that it is of, and has the echoes before as `raws`.
 
         ToleranceMissed of one, or several, is raised when all are finished, with the list of all as its `raws`.
         """
@@ -116,8 +116,9 @@ class EchoesOfTracks:
                 assert exc.raw is not None
                 echoes.append(exc.raw)
                 missed = missed or exc
-            except Exception as exc:
-                exc.add_note(f"track[{i}], of a list of {len(self.tracks)}")
+            except BaseException as exc:
+                exc.raws = echoes  # type: ignore[attr-defined]  # what is finished is not lost
+                exc.add_note(f"track[{i}], of a list of {len(self.tracks)}; `raws` has the echoes of those before it")
                 raise
         if missed is not None:
             missed.raws = echoes

@@ -248,11 +248,13 @@ def test_other_verbs_take_one_track():
         sarcl.spectral_echo(points(), CHIRP, TRACKS)
 
 
-def test_an_error_names_the_track_that_it_is_of():
+def test_an_error_names_the_track_that_it_is_of_and_keeps_the_echoes_before():
     away = sarcl.Trajectory.circle(radius=5e3, height=-3e3, arc=0.02, n_pulses=12)
     with pytest.raises(ValueError) as refused:
         sarcl.echo(rough(), CHIRP, [TRACKS[0], away])
-    assert refused.value.__notes__ == ["track[1], of a list of 2"]
+    assert refused.value.__notes__ == ["track[1], of a list of 2; `raws` has the echoes of those before it"]
+    (kept,) = refused.value.raws
+    assert (np.asarray(kept.samples) == np.asarray(sarcl.echo(rough(), CHIRP, TRACKS[0]).samples)).all()
 
 
 def test_missed_tolerances_are_told_when_all_tracks_are_finished(monkeypatch):
