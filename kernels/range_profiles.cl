@@ -64,19 +64,20 @@ __kernel void pad(__global const REAL *restrict from, int length, int padding, i
     out[o + 1] = from[source + 1];
 }
 
+typedef struct { int parts, n_rows, planes, padding, first; } fold_numbers;
+
 // global size (length, rows)
 //   sums  (parts, n_rows, planes, length + 2 padding, 2) from row `first` on: profiles are the sums of all parts, and of the
 //         last two planes, a total and its rest
 //   out   (rows, length, 2)
-__kernel void fold(__global const REAL *restrict sums, int parts, int n_rows, int planes, int padding, int first,
-                   __global REAL *restrict out) {
-    int bin = get_global_id(0), length = get_global_size(0), stride = length + 2 * padding;
-    size_t row = first + get_global_id(1);
+__kernel void fold(fold_numbers given, __global const REAL *restrict sums, __global REAL *restrict out) {
+    int bin = get_global_id(0), length = get_global_size(0), stride = length + 2 * given.padding;
+    size_t row = given.first + get_global_id(1);
     pair re = make_pair(0, 0), im = make_pair(0, 0);
-    for (int part = 0; part < parts; part++) {
-        __global const REAL *total = sums + 2 * ((part * (size_t)n_rows + row + 1) * planes - 2) * stride;
+    for (int part = 0; part < given.parts; part++) {
+        __global const REAL *total = sums + 2 * ((part * (size_t)given.n_rows + row + 1) * given.planes - 2) * stride;
         __global const REAL *rest = total + 2 * stride;
-        for (int at = (bin + padding) % length; at < stride; at += length) {
+        for (int at = (bin + given.padding) % length; at < stride; at += length) {
             re = pair_add(re, exact_sum(total[2 * at], rest[2 * at]));
             im = pair_add(im, exact_sum(total[2 * at + 1], rest[2 * at + 1]));
         }

@@ -181,7 +181,9 @@ def _values(
     """
     kernel = deconvolved(TAPS, FINER, TERMS, np.float64)
     weights = np.stack([shaped, np.ones(len(samples)), shaped * _edge_weights(len(samples))])
-    profile, plain, weighted = range_profiles.from_samples(None, samples[None], weights, length, dtype=np.complex128)
+    profile, plain, weighted = range_profiles.from_samples(
+        None, samples[None], weights, length, dtype=np.complex128, n_rows=1
+    )
     place = delays * length - (kernel.taps - 1) / 2
     first = np.rint(place).astype(np.int64)
     taps = (first[:, None] + np.arange(kernel.taps)) % length

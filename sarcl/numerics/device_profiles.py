@@ -13,6 +13,7 @@ from ..base import float_pairs
 from ..opencl import fft
 from ..opencl.device import Device
 from ..opencl.fft_batches import Batches
+from ..opencl.launch_numbers import launch_numbers
 from . import range_profiles
 from .interpolation import Interpolator
 from .weighted_samples import bound_of_held
@@ -111,7 +112,11 @@ class SpreadSamples:
     Where the device transforms rows, the samples alone are downloaded; on a CPU range_profiles.to_samples makes them.
     """
 
-    def __init__(self, device: Device, n_samples: int, interpolator: Interpolator, length: int) -> None:
+    def __init__(
+        self, device: Device, n_samples: int, interpolator: Interpolator, length: int, n_rows: int | None = None
+    ) -> None:
+        """n_rows  of the whole job, as `fft.rows` takes it"""
+        self.n_rows = n_rows
         self.device, self.n_samples, self.interpolator, self.length = device, n_samples, interpolator, length
         self.pad = range_profiles.padding(interpolator)
         self._batches = Batches(device, length, np.complex64) if possible(device, length, np.complex64) else None
@@ -133,7 +138,7 @@ class SpreadSamples:
             stride = self.length + 2 * self.pad
             made = device.download(sums, np.empty((parts, rows, planes, stride), np.complex64))
             total = made[:, :, -2:].sum(axis=(0, 2), dtype=np.complex128).astype(np.complex64)
-            return range_profiles.to_samples(device, total, self.n_samples, self.interpolator)
+            return range_profiles.to_samples(device, total, self.n_samples, self.interpolator, self.n_rows)
         fold, cut = (device.kernel("range_profiles.cl", name, **SINGLE) for name in ("fold", "cut"))
         if self._correction is None:
             correction = range_profiles.correction(self.interpolator, self.n_samples, self.length)
@@ -142,7 +147,10 @@ class SpreadSamples:
             self._out = None
             self._out = device.empty(8 * rows * self.n_samples)
         for first, count, work in self._batches.of(rows):
-            device.run(fold, (self.length, count), None, sums, parts, rows, planes, self.pad, first, work)
+            numbers = launch_numbers(
+                "range_profiles.cl", "fold", parts=parts, n_rows=rows, planes=planes, padding=self.pad, first=first
+            )
+            device.run(fold, (self.length, count), None, numbers, sums, work)
             self._batches.transform()
             device.run(cut, (self.n_samples, count), None, work, self.length, self._correction, first, self._out)
         return device.download(self._out, np.empty((rows, self.n_samples), np.complex64))

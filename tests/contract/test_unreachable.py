@@ -341,6 +341,7 @@ MAY_CATCH = {
     "opencl/_trial.py": "a driver's trial: whatever it raises, the device does not work",
     "cli/parser.py": "text of a command line; the last resort of a program",
     "simulation/echo_output.py": "numpy's sizes that overflow",
+    "simulation/tracks/_track_files.py": "a file of echoes, or a list of tracks, that is damaged",
     "experiments/fda/file.py": "the file and case are put before a message, which is raised again",
     "experiments/fda/_sweep.py": "the values of a sweep are put before a message, which is raised again",
     "base/host_memory.py": "a system that does not say its memory",

@@ -124,7 +124,7 @@ def test_facets_that_work_groups_add_up_are_those_of_single_work_items(device, o
 @pytest.mark.parametrize("n_pulses", [1, 100, 10_000])
 def test_groups_are_at_least_100_000_work_items(device, n_pulses):
     for units in (8, 132):
-        gpu = Device(replace(device.info, kind="gpu", units=units), device._raw)
+        gpu = Device(replace(device.info, kind="gpu", units=units, vector_width=1), device._raw)
         parts = spreading.Rows(gpu, 64, 1, n_pulses, 10**6).splits
         assert min(n_pulses, spreading.most_pulses(gpu)) * parts * spreading.GROUP >= 100_000
     assert spreading.Rows(gpu, 64, 1, 1, 7).splits == 7
