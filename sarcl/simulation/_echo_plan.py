@@ -99,6 +99,7 @@ class EchoPlan:
         with warned_once():  # the scene may be prepared for one method and then for the other
             planned, prepared = self.plan_scene(request).with_scene()
             filler = self._filler(planned, prepared, checkpoint, clock)
+        clock.lap("plan")
         if self.piece and not filler.fill_piece(self.piece):
             return None
         if output is None:
