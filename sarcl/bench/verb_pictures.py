@@ -45,6 +45,7 @@ def picture(cases: list[ratios.Result]) -> bytes:
         axes.set_yscale("log")
         axes.margins(0.12, 0.1)
     plots.decades(error.yaxis)
+    plots.decades(error.xaxis)
     plots.names(error, "relative error against the exact result", "CPU seconds")
     plots.names(size, "size n", "")
     size.set_xticks(sizes, [str(n) for n in sizes])
