@@ -16,10 +16,12 @@ from ..experiments.fda.case import Case
 from ..model import pointing
 from ..model.antenna import Antenna
 from ..model.antenna_array import AntennaArray
+from ..model.image import Image
 from ..model.image_grid import ImageGrid
 from ..model.phase_history import PhaseHistory
 from ..model.trajectory import Trajectory
 from ..model.waveform import Waveform
+from ..opencl.device import Device
 from ..reference import equations
 from ..reference.polar_format import polar_format
 from ..scene import shapes
@@ -70,8 +72,9 @@ def relative(values: np.ndarray, wanted: np.ndarray, norm: float) -> Errors:
     return wrong / max(own, norm), wrong / own
 
 
-def measured(result: Any) -> Errors:
+def measured(result: PhaseHistory) -> Errors:
     """Errors that the verb's own check measured, against the float64 reference."""
+    assert result.report is not None and result.report.measured_error is not None  # check=True gives both
     return result.report.measured_error, result.report.measured_error
 
 
@@ -153,14 +156,16 @@ def array_beam(name: str, n: int) -> VerbCase:
     positions = np.stack([np.outer(distance, f(angle)) for f in (np.cos, np.sin, np.zeros_like)], axis=2)
     at = random.integers(0, (n, n, 64), (CHECKED, 3)).T
 
-    def call(*, check: bool, **options: Any) -> np.ndarray:
-        return beam(array, 10e9, times=times, positions=positions, **options)
+    def call(*, check: bool, tolerance: float, device: Device | None) -> np.ndarray:
+        return beam(array, 10e9, times=times, positions=positions, tolerance=tolerance, device=device)
 
     def compare(field: np.ndarray) -> Errors:
-        wanted = np.array([
-            equations.field(array.positions, array.offsets_at(0), np.ones(n), 10e9, times[t], positions[i, j])
-            for t, i, j in at.T
-        ])  # fmt: skip
+        wanted = np.array(
+            [
+                equations.field(array.positions, array.offsets_at(0), np.ones(n), 10e9, times[t], positions[i, j])
+                for t, i, j in at.T
+            ]
+        )
         wrong = np.abs(field[tuple(at)] - wanted).max()
         return float(wrong / n), float(wrong / np.abs(wanted).max())
 
@@ -174,9 +179,13 @@ def noise(n: int, samples: int, track: Trajectory) -> PhaseHistory:
     band = SPEED_OF_LIGHT / (2 * CELL)
     tx = track.positions
     return PhaseHistory(
-        white, frequency=CENTER - band / 2, frequency_step=band / samples, tx=tx,
-        reference_range=np.linalg.norm(tx, axis=1), time=track.times,
-    )  # fmt: skip
+        white,
+        frequency=CENTER - band / 2,
+        frequency_step=band / samples,
+        tx=tx,
+        reference_range=np.linalg.norm(tx, axis=1),
+        time=track.times,
+    )
 
 
 def backprojected_image(name: str, n: int) -> VerbCase:
@@ -184,7 +193,7 @@ def backprojected_image(name: str, n: int) -> VerbCase:
     raw, grid = noise(n, n, straight(n, 300.0)), ImageGrid.plane(shape=(n, n), spacing=CELL / 2)
     index, places = grid.sample(CHECKED, seed=1)
 
-    def compare(image: Any) -> Errors:
+    def compare(image: Image) -> Errors:
         return relative(image.data[index], *exact.backproject(raw, places))
 
     return VerbCase(name, n, n**3, functools.partial(verbs.backproject, raw, grid), compare)
@@ -195,7 +204,7 @@ def polar_image(name: str, n: int) -> VerbCase:
     raw, grid = noise(n, n, straight(n, 300.0)), ImageGrid.plane(shape=(n, n), spacing=CELL / 2)
     index, places = grid.sample(CHECKED, seed=1)
 
-    def compare(image: Any) -> Errors:
+    def compare(image: Image) -> Errors:
         return relative(image.data[index], *polar_format(raw, places, np.zeros(3)))
 
     return VerbCase(name, n, n**3, functools.partial(verbs.polar_format, raw, grid), compare)
@@ -206,7 +215,7 @@ def range_doppler_image(name: str, n: int) -> VerbCase:
     track = Trajectory.line(start=(-7e3, -0.12 * n, 7e3), velocity=(0, 100, 0), prf=100 / 0.24, n_pulses=n)
     raw = noise(n, n // 2, track)
 
-    def compare(image: Any) -> Errors:
+    def compare(image: Image) -> Errors:
         index, places = image.grid.sample(CHECKED, seed=1)
         return relative(image.data[index], *exact.backproject(raw, places))
 

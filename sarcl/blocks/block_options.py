@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -67,10 +67,9 @@ class BlockOptions(RunOptions):
             raise ValueError(
                 "tile and resume=False do not go together: a piece would delete the tiles of the other pieces"
             )
-        parts: Any = tile
-        if not isinstance(parts, (tuple, list)) or len(parts) != 2:
+        if not isinstance(tile, (tuple, list)) or len(tile) != 2:
             raise ValueError(f"tile is {' '.join(repr(tile).split()):.60}; wanted (i, n): piece i of n")
-        i, n = count("tile[0]", parts[0], least=0), count("tile[1]", parts[1])
+        i, n = count("tile[0]", tile[0], least=0), count("tile[1]", tile[1])
         if i > n:
             raise ValueError(f"tile is {tile!r}; pieces of {n} are numbered 1 to {n}")
         return i, n

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 from ..base.stage_timer import Clock
 from ..base.types import LazyRows
@@ -43,7 +44,7 @@ class WorkerTask:
 
     recipe: Recipe
     bands: Bands
-    dtype: Any
+    dtype: DTypeLike
     tally: type[Tally]
     device: Devices
     name: str

@@ -71,9 +71,13 @@ class AmplitudeSamples:
 
     @classmethod
     def of_facets(
-        cls, facets: FacetSet, weights: AntennaWeights, polarizations: Sequence[str], vertical: np.ndarray,
+        cls,
+        facets: FacetSet,
+        weights: AntennaWeights,
+        polarizations: Sequence[str],
+        vertical: np.ndarray,
         frequency: float,
-    ) -> AmplitudeSamples:  # fmt: skip
+    ) -> AmplitudeSamples:
         """Of facets."""
         part, share = sample_of(facets, np.random.default_rng(0))
         corner = float(np.maximum.reduce(edges(facets.triangles)).max()) * 2 / 3 if facets.is_mirror else 0.0

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...base import float_pairs
+from ...opencl.device import Buffer
 from ...opencl.launch_numbers import launch_numbers
 from ...scattering.rough_pieces import KERNELS, RoughPieces, in_groups
 from ..spreading import PER_TILE, DeviceTiles
@@ -91,7 +92,7 @@ class PieceTiling:
     def _place(self) -> tuple[Any, Any]:
         return self.pieces.placed(*self._numbers, self.stride)
 
-    def _bounds(self, per_tile: int, centers: Any) -> tuple[np.ndarray, Any]:
+    def _bounds(self, per_tile: int, centers: Buffer) -> tuple[np.ndarray, Buffer]:
         """Middles of tiles about the centre, and their radii, m (4, n_tiles), and the same on the device."""
         n_tiles = self.n_tiles(per_tile)
         tiles = self.device.empty(32 * n_tiles)

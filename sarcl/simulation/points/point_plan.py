@@ -61,9 +61,14 @@ class PointPlan:
         return None if self.direct is None else PointSpreader(*self.direct, view, nodes, tolerance, budget)
 
     def factorized_spreader(
-        self, device: Device, points: Points, view: ChannelView, nodes: np.ndarray, columns: Sequence[int],
+        self,
+        device: Device,
+        points: Points,
+        view: ChannelView,
+        nodes: np.ndarray,
+        columns: Sequence[int],
         budget: float,
-    ) -> FactorizedSpreader | None:  # fmt: skip
+    ) -> FactorizedSpreader | None:
         """What adds points by levels; nodes, budget  as PointSpreader takes them; columns  in which points reflect."""
         if self.factorized is None:
             return None
