@@ -97,7 +97,8 @@ class ChannelView:
     @property
     def band(self) -> Band:
         """The band of a row of its samples."""
-        return Band(len(self.frequencies), self.bandwidth, float(self.antennas.frequency.mean()))
+        # the median of equal frequencies is that frequency, to the bit: plans are kept by their band
+        return Band(len(self.frequencies), self.bandwidth, float(np.median(self.antennas.frequency)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +13,7 @@ from ...numerics.plan import Plan
 from ...scattering.facets import POLARIZATIONS, FacetSet, diagram_macros, vertical_axes
 from ...scattering.kept_amplitudes import AmplitudeSamples, passes_overhead
 from ..factorized.cells import ScattererCells, scatterers_in_window
-from ..factorized.levels import FEWEST_PULSES, Amplitudes, FactorizedPlan, plan_levels
+from ..factorized.levels import COSTS_MORE, FEWEST_PULSES, Amplitudes, FactorizedPlan, plan_levels
 from ..factorized.scatterers import Channel, Scatterers
 from ..factorized.spreader import FactorizedSpreader
 from ..spreading import ChannelView
@@ -101,6 +102,9 @@ class _Case:
             return "the GPU adds these pulses before the host has made cells"
         if not self.forced and BYTES * len(self.facets) > self.budget:
             return "cells of so many facets take more memory than max_bytes allows"
+        most = math.inf if self.forced else cost_model.MERGING_PAYS * self._direct_cost
+        if cost_model.CELL_FACET > most * len(antennas):
+            return COSTS_MORE
         if passes_overhead(self.facets, view.weights, view.vertical):
             return "antennas pass over the facets, where horizontal and vertical turn fast"
         steady = np.flatnonzero(~self.facets.is_changing)
@@ -113,11 +117,9 @@ class _Case:
                 return "too few facets lie inside the range window at every pulse"
             steady = steady[np.sort(cells.order[seen])]
             cells = ScattererCells(self.tiled.numbers[0][steady])
-        plan = plan_levels(cells, antennas, view.band, self._room, self._amplitudes(steady))
+        plan = plan_levels(cells, antennas, view.band, self._room, self._amplitudes(steady), most=most)
         if isinstance(plan, str):
             return plan
-        if not self.forced and plan.cost > cost_model.MERGING_PAYS * self._direct_cost:
-            return "the direct method costs less"
         return _Levels(cells, steady[cells.order], plan)
 
     @property
@@ -135,7 +137,7 @@ class _Case:
         def image_error(leaf: Plan) -> float:
             return self.tiled.image_error(leaf, view.band)
 
-        return Amplitudes(image_error, samples, self._n_channels, cost_model.LEAF_FACET + gain)
+        return Amplitudes(image_error, samples, self._n_channels, cost_model.LEAF_FACET + gain, cost_model.CELL_FACET)
 
     @property
     def _polarizations(self) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -34,6 +35,7 @@ SHARE_SLACK = 1.3  # ratio of a filter's error to its share, at most: other erro
 SMALLER_RATIO = 0.75  # factor on a decimation ratio whose error is too large
 POINTS = 64  # points along the Morton curve at which the change of direction is estimated
 CENTERS = 4  # cells of a level where directions change fastest, in which a filter's error is computed
+COSTS_MORE = "the direct method costs less"
 DIRECTIONS = np.array([v for v in np.ndindex(3, 3, 3) if v != (1, 1, 1)], float) - 1
 DIRECTIONS /= np.linalg.norm(DIRECTIONS, axis=1)[:, None]
 
@@ -106,20 +108,31 @@ class Amplitudes:
 
     image_error  of the kernel of a plan: larger than that of the kernel where scatterers lie evenly
     samples      of amplitudes that change along the track; None: they do not
-    channels     in which scatterers are added;  leaf  cost of the amplitude of one at a kept position, in contributions
+    channels     in which scatterers are added
+    leaf, cell   cost of the amplitude of one at a kept position, and of putting one into cells, in contributions
     """
 
     image_error: Callable[[Plan], float]
     samples: AmplitudeSamples | None = None
     channels: int = 1
     leaf: float = 0.0
+    cell: float = cost_model.CELL_POINT
 
 
 def plan_levels(
-    cells: ScattererCells, antennas: PulseGeometry, band: Band, tolerance: float, amplitudes: Amplitudes
+    cells: ScattererCells,
+    antennas: PulseGeometry,
+    band: Band,
+    tolerance: float,
+    amplitudes: Amplitudes,
+    *,
+    most: float = math.inf,
 ) -> FactorizedPlan | str:
-    """The cheapest plan whose predicted error is at most `tolerance`, or the reason why there is none."""
-    case = _Case(cells, antennas, band, tolerance, amplitudes)
+    """The cheapest plan whose predicted error is at most `tolerance`, or the reason why there is none.
+
+    most  cost of a plan, per pair of scatterer and pulse, above which the direct method is taken
+    """
+    case = _Case(cells, antennas, band, tolerance, amplitudes, most)
     candidates = sorted(case.candidates(), key=lambda candidate: candidate.cost)
     reason = "neighbouring pulses see even the smallest cells of points from directions that differ too much"
     for candidate in candidates[:TRIES]:
@@ -140,8 +153,9 @@ class _Case:
         band: Band,
         tolerance: float,
         amplitudes: Amplitudes,
+        most: float,
     ) -> None:
-        self.cells, self.band, self.amplitudes = cells, band, amplitudes
+        self.cells, self.band, self.amplitudes, self.most = cells, band, amplitudes, most
         self.changing = 0.0 if amplitudes.samples is None else AMPLITUDE_SHARE * tolerance
         self.tolerance = tolerance - self.changing
         group = groups(len(antennas), antennas.frequency, antennas.frequency_step)
@@ -220,7 +234,7 @@ class _Case:
             + n_cells
             * (cost_model.LEAF_ROW + cost_model.LEAF_LANES * self.amplitudes.leaf + cost_model.LEAF_SAMPLE * samples)
         )
-        total = self.amplitudes.channels * total + cost_model.CELL_POINT * len(self.cells)
+        total = self.amplitudes.channels * total + self.amplitudes.cell * len(self.cells)
         return total / (len(self.cells) * len(self.antennas))
 
     def build(self, candidate: Candidate) -> FactorizedPlan | str:
@@ -233,6 +247,8 @@ class _Case:
         ratios: list[int] = []
         samples, left = self.amplitudes.samples, self.changing
         weights, changes = samples and samples.weights, 0.0
+        if candidate.cost > self.most:
+            return COSTS_MORE
         for cells, ratio in zip(levels, candidate.ratios, strict=True):
             most = (left - changes) / (len(levels) - len(decimations))
             while True:
@@ -243,6 +259,10 @@ class _Case:
                 if (filtered <= SHARE_SLACK * share and changed <= most) or ratio <= 2:
                     break
                 ratio = max(2, int(ratio * SMALLER_RATIO))
+                # later levels keep their ratios at best
+                reached = (*ratios, ratio, *candidate.ratios[len(ratios) + 1 :])
+                if self._cost_of(candidate, reached) > self.most:
+                    return COSTS_MORE
             if changed > most:
                 return "amplitudes change too much along the track, or antennas' tables end among the scatterers"
             error, changes = error + filtered + candidate.between.error, changes + changed
@@ -257,8 +277,14 @@ class _Case:
         reaches = _reaches(levels, sigma, leaf.interpolator.taps, candidate.between.taps)
         planned = tuple(Level(*v) for v in zip(levels, decimations, reaches, strict=True))
         predicted = error + leaf.predicted_error + changes
-        cost = self._cost(candidate.depths, candidate.spread, candidate.between, candidate.filter_taps, tuple(ratios))
+        cost = self._cost_of(candidate, tuple(ratios))
+        if cost > self.most:
+            return COSTS_MORE
         return FactorizedPlan(planned, candidate.between, leaf, predicted, cost)
+
+    def _cost_of(self, candidate: Candidate, ratios: tuple[int, ...]) -> float:
+        """About the cost of a candidate with other ratios of decimation."""
+        return self._cost(candidate.depths, candidate.spread, candidate.between, candidate.filter_taps, ratios)
 
     def _filter_error(self, source: PulseGeometry, decimation: Decimation, cells: CellLevel) -> float:
         """Largest error of interpolation between the kept pulses, in cells where directions change fastest."""

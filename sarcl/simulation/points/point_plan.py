@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -150,13 +151,11 @@ class PreparedPoints:
             places, amplitudes = self.points.positions[numbers], self.points.amplitudes[numbers]
             samples = AmplitudeSamples.of_points(places, amplitudes, weights, highest)
         kind = Amplitudes(lambda leaf: self._image_error(leaf, band), samples, n_nodes, leaf)
-        plan = plan_levels(cells, antennas, band, tolerance, kind)
+        direct = n_nodes * (_direct_cost(band, tolerance, len(self)) + leaf)
+        most = math.inf if forced else cost_model.MERGING_PAYS * direct
+        plan = plan_levels(cells, antennas, band, tolerance, kind, most=most)
         if isinstance(plan, str):
             return plan
-        if not forced and plan.cost > cost_model.MERGING_PAYS * n_nodes * (
-            _direct_cost(band, tolerance, len(self)) + leaf
-        ):
-            return "the direct method costs less"
         if seen.all():
             return PointPlan(None, (cells, numbers, plan))
         rest = self._tiled(self._cells.order[~seen])
