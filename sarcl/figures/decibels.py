@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple, cast
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -43,36 +43,36 @@ class _Scale(NamedTuple):
         return "the brightest pixel" if value == 100 else f"percentile {value:g} of the scene"
 
 
-class _PixelAxes(NamedTuple):
-    """Spacing of the pixels, or None, coordinates of the middle one and their names, as `picture` takes them."""
+class PixelAxes(NamedTuple):
+    """Axes of a picture of pixels.
 
-    spacing: tuple[float, float] | None
-    origin: tuple[float, float]
-    names: tuple[str, str]
+    spacing  (row, column), m; None: axes count pixels
+    origin   (row, column) coordinates, m, of pixel [rows//2, columns//2];  names: the names of these coordinates
+    """
+
+    spacing: tuple[float, float] | None = None
+    origin: tuple[float, float] = (0.0, 0.0)
+    names: tuple[str, str] = ("y", "x")
 
 
 def picture(
     db: ArrayLike,
-    spacing: float | tuple[float, float] | None = None,
+    axes: PixelAxes | None = None,
     floor_db: float = -50.0,
     title: str | None = None,
     *,
     top_db: float | None = None,
     percentile: float | None = None,
     zero: str | None = None,
-    origin: tuple[float, float] = (0.0, 0.0),
-    names: tuple[str, str] = ("y", "x"),
 ) -> Picture:
     """Draw decibels (rows, columns) in grey, or as a line where there is one row or one column.
 
     db          dB, real; row 0 is drawn at the bottom; -inf means no signal
-    spacing     (row, column) m; None: axes count pixels
     floor_db    level of black, in dB below white; negative
     top_db      level of white, in dB; None: taken from the data, see `white_level`
     percentile  per cent of the pixels of the scene that are no brighter than white, above 0 to 100; None: 99.5.
                 100 makes the brightest pixel white. Not to be given together with top_db
     zero        meaning of 0 dB, for the caption
-    origin      (row, column) coordinates, m, of pixel [rows//2, columns//2];  names: the names of these coordinates
 
     Returns a PIL.Image. A caption under the axes says what white and black are. Entries of its `info`: "frame", the
     box (left, top, right, bottom) in which the data are drawn; "caption"; "top_db" and "floor_db", the level of white
@@ -92,11 +92,11 @@ def picture(
         index = np.unravel_index(int(np.argmin(db < np.inf)), db.shape)
         raise ValueError(f"db[{index[0]}, {index[1]}] is {db[index]}; decibels are finite, or -inf for no signal")
     check_scale(floor_db, top_db, percentile)
-    if spacing is not None:
-        dy, dx = cast(tuple[float, float], spacing if np.ndim(spacing) else (spacing, spacing))
-        spacing = validation.number("spacing[0]", dy, above=0), validation.number("spacing[1]", dx, above=0)
+    axes = axes or PixelAxes()
+    for i, step in enumerate(axes.spacing or ()):
+        validation.number(f"spacing[{i}]", step, above=0)
     draw = _line_plot if 1 in db.shape and db.size > 1 else _grey_image
-    return draw(db, _PixelAxes(spacing, origin, names), _Scale(floor_db, top_db, percentile), title, zero)
+    return draw(db, axes, _Scale(floor_db, top_db, percentile), title, zero)
 
 
 def check_scale(
@@ -230,7 +230,7 @@ def _means(power: np.ndarray, n: int) -> np.ndarray:
     return sums / np.diff(edge)
 
 
-def _grey_image(db: np.ndarray, axes: _PixelAxes, scale: _Scale, title: str | None, zero: str | None) -> Picture:
+def _grey_image(db: np.ndarray, axes: PixelAxes, scale: _Scale, title: str | None, zero: str | None) -> Picture:
     from PIL import Image
 
     height, width = drawn_shape((db.shape[0], db.shape[1]), axes.spacing)
@@ -281,7 +281,7 @@ def _decibels(value: float) -> str:
     return f"{round(value, 1) + 0.0:.1f} dB"
 
 
-def _line_plot(db: np.ndarray, axes: _PixelAxes, scale: _Scale, title: str | None, zero: str | None) -> Picture:
+def _line_plot(db: np.ndarray, axes: PixelAxes, scale: _Scale, title: str | None, zero: str | None) -> Picture:
     floor_db, top_db, _ = scale
     along = int(db.shape[0] > 1)  # 1: one column, drawn along its rows
     most = LINE_SAMPLES * CURVE_WIDTH

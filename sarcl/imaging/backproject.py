@@ -255,14 +255,16 @@ def _antenna_gain(
 
 def _measure_error(task: FocusingTask, grid: ImageGrid, data: Any) -> float:  # data: an array, or a dataset of a file
     """Relative error at up to 256 random pixels against the exact float64 sum, as `tolerance` is defined."""
+    from ..reference.backproject import PerPoint
     from ..reference.backproject import backproject as exact
 
     index, positions = grid.sample(CHECKED, seed=0)
     beam = None if task.antennas.beam is None else (task.antennas.beam_angle, task.antennas.beam)
-    share = None if task.taper is None else PixelTaper(task).weights(positions)
+    share = 1.0 if task.taper is None else PixelTaper(task).weights(positions)
     if task.antenna is not None:
         share = shares(task, positions)
-    truth, spread = exact(task.raw, positions, task.sample_weight, task.row_weight, task.wrap, beam, EDGE, share)
+    weights = task.sample_weight, task.row_weight
+    truth, spread = exact(task.raw, positions, *weights, task.wrap, beam, EDGE, PerPoint(share))
     got = (
         np.asarray(data)[index]
         if isinstance(data, np.ndarray)

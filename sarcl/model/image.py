@@ -232,7 +232,7 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
 
         ValueError where the image has not two axes, or for levels that no picture can have.
         """
-        from ..figures.decibels import picture
+        from ..figures.decibels import PixelAxes, picture
 
         title = arguments.text("title", title)
         if len(self.grid.shape) != 2:
@@ -257,14 +257,12 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
             raise ValueError(f"image data[{i}, {j}] is {np.asarray(self.data)[i, j]}; a picture needs finite pixels")
         return picture(
             db,
-            spacing,
+            PixelAxes(spacing, origin, names),
             floor_db,
             title,
             top_db=top_db,
             percentile=percentile,
             zero="a unit point in focus",
-            origin=origin,
-            names=names,
         )
 
     def _repr_png_(self) -> bytes | None:

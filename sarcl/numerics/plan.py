@@ -91,18 +91,29 @@ class Plan:
         return (32 if bistatic else 24 if self.range_mode in (1, 3) else 16) + 8 * beam
 
 
+class ProfileSums(NamedTuple):
+    """Sums over points and range profiles that a plan is made for.
+
+    distance        smallest from an antenna to the scene, m;  frequency  the highest, Hz;  bandwidth  Hz
+    n_samples       of a row;  points_per_row  that read its profile;  chunk  rows or points summed in float32
+    carrier         Hz, from which images of the kernel keep away (interpolator_choice.off_carrier); 0: from none
+    """
+
+    distance: float
+    frequency: float
+    bandwidth: float
+    n_samples: int
+    points_per_row: int
+    chunk: int
+    carrier: float = 0.0
+
+
 def cheapest(
     tolerance: float,
     tiles: Iterable[tuple[int, float]],
+    sums: ProfileSums,
     *,
-    distance: float,
-    frequency: float,
-    bandwidth: float,
-    n_samples: int,
-    points_per_row: int,
-    chunk: int,
     least_tolerance: float = LEAST_TOLERANCE,
-    carrier: float = 0.0,
     image_gain: float = 1.0,
     gathering: cost_model.Gathering = cost_model.ON_CPU,
     native_error: float | None = None,
@@ -111,9 +122,7 @@ def cheapest(
     """The cheapest plan whose predicted error is at most `tolerance`.
 
     tiles        choices of (points per tile, radius of the largest tile in m)
-    distance     smallest from an antenna to the scene, m; frequency the highest, Hz
-    chunk        rows or points summed in float32; least_tolerance: a tolerance below it is refused
-    carrier      Hz, from which images of the kernel keep away (interpolator_choice.off_carrier); 0: no such condition
+    least_tolerance  a tolerance below it is refused
     image_gain   factor on the interpolator's error, for scatterers on which the images of its kernel add up
     gathering    costs on the devices that follow the plan
     native_error  of their own sine and cosine, rad, which the plan takes; None: it takes polynomials
@@ -121,6 +130,7 @@ def cheapest(
     ToleranceUnreachable names the smallest tolerance that can be met.
     """
     best: tuple[float, Plan] | None = None
+    distance, frequency, bandwidth, n_samples, points_per_row, chunk, carrier = sums
     steps = carrier_steps(carrier, n_samples, bandwidth)
     wavenumber = 2 * frequency / SPEED_OF_LIGHT
 

@@ -59,14 +59,14 @@ class PulseGeometry:
     @classmethod
     def sampled(
         cls, tx: np.ndarray, rx: np.ndarray, reference_range: np.ndarray, *, first: Any, step: Any, n_samples: int,
-        near: Any, far: Any, **others: Any,
+        window: tuple[Any, Any], **others: Any,
     ) -> PulseGeometry:  # fmt: skip
         """Geometry of pulses that have n_samples samples in frequency, from `first` on and `step` apart, Hz.
 
-        first, step, near, far: (n,), or the same for all pulses
+        window (near, far), m, about the reference range; these, first and step: (n,), or the same for all pulses
         """
-        frequency, step = np.asarray(first + n_samples // 2 * step), np.asarray(step)
-        return cls(tx, rx, reference_range, frequency, step, np.asarray(near), np.asarray(far), **others)
+        frequency, step, near, far = map(np.asarray, (first + n_samples // 2 * step, step, *window))
+        return cls(tx, rx, reference_range, frequency, step, near, far, **others)
 
     def __len__(self) -> int:
         return len(self.tx)

@@ -40,7 +40,6 @@ def facet_echo(
     reference_range: float,
     *,
     by_facet: bool = False,
-    extra_nodes: int = 0,
     up: tuple[float, float, float] = UP,
 ) -> np.ndarray:
     """Sum over facets of k/(2 sqrt(pi)) integral S exp(-j 2 pi f (tau(x) - tau_ref)) dA, m complex128 (n_f, 2, 2).
@@ -48,7 +47,6 @@ def facet_echo(
     triangles     m (k, 3, 3), lit on the side their normals point to;  permittivity  (), (k,) or (n_f, k)
     frequencies   Hz (n_f,);  tx, rx  m (3,);  reference_range  m, tau_ref = 2 reference_range/c
     by_facet      True: S is that of a facet's centroid; False: that of every point
-    extra_nodes   quadrature nodes more per side, to see that there are enough
 
     tau(x) = (|tx - x| + |x - rx|)/c is exact: no expansion in frequency, space or range. Spreading loss is left out:
     it is a separate factor. Gauss-Legendre in both coordinates of the triangle shrunk to its first vertex; nodes by the
@@ -62,7 +60,7 @@ def facet_echo(
         edges = facet - np.roll(facet, 1, axis=0)
         slope = unit(tx - facet) + unit(rx - facet)
         phase = 2 * np.pi * frequencies.max() / SPEED_OF_LIGHT * np.abs(slope @ edges.T).max()
-        points, weight = triangle_nodes(facet, int(phase / 4) + 40 + extra_nodes)
+        points, weight = triangle_nodes(facet, int(phase / 4) + 40)
         delay = excess_delay(tx, rx, points, reference_range)
         at = facet.mean(axis=0)[None] if by_facet else points
         for i, f in enumerate(frequencies):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,45 +31,75 @@ def spread(
     return out
 
 
+class Coordinates(NamedTuple):
+    """Places (n_u, n_f) that `migrate` reads: first tap and rest on the grid, cycles, a table's cell and rest."""
+
+    first: np.ndarray
+    rest: np.ndarray
+    cycles: np.ndarray
+    cell: np.ndarray
+    cell_rest: np.ndarray
+
+
 def migrate(
-    grid: np.ndarray, first: np.ndarray, rest: np.ndarray, cycles: np.ndarray, cell: np.ndarray, cell_rest: np.ndarray,
-    tables: np.ndarray, basis: np.ndarray, kernel: Interpolator,
-) -> np.ndarray:  # fmt: skip
-    """y(u, f), complex128 (n_u, n_f), of a grid (n_u, n_range); coordinates (n_u, n_f), basis (n_tables, n_f)."""
+    grid: np.ndarray, coordinates: Coordinates, tables: np.ndarray, basis: np.ndarray, kernel: Interpolator
+) -> np.ndarray:
+    """y(u, f), complex128 (n_u, n_f), of a grid (n_u, n_range), and tables whose basis is (n_tables, n_f)."""
+    first, rest, cycles, cell, cell_rest = coordinates
     n_range, rows = grid.shape[1], np.arange(len(grid))[:, None]
-    weights, made = kernel.weights(rest), np.zeros(first.shape, np.complex128)
+    weights, profile = kernel.weights(rest), np.zeros(first.shape, np.complex128)
     for t in range(kernel.taps):
-        made += weights[..., t] * grid[rows, (first + t) % n_range]
-    made /= kernel.transform((first + rest + (kernel.taps - 1) / 2) / n_range)
+        profile += weights[..., t] * grid[rows, (first + t) % n_range]
+    profile /= kernel.transform((first + rest + (kernel.taps - 1) / 2) / n_range)
     table = np.einsum("qf,qn->fn", basis, tables)
     shares = lagrange(np.array([-1.0, 0, 1, 2]), cell_rest.ravel()).reshape(4, *cell.shape)
     amplitude = sum(shares[i] * table[np.arange(len(table)), np.maximum(cell, 0) + i] for i in range(4))
-    return np.asarray(np.where(cell < 0, 0, amplitude * made * np.exp(2j * np.pi * cycles)))
+    return np.asarray(np.where(cell < 0, 0, amplitude * profile * np.exp(2j * np.pi * cycles)))
+
+
+class EdgeScatterers(NamedTuple):
+    """Scatterers (n,): amplitude b, azimuth and slant range, m, and the pulse at which a beam's edge passes."""
+
+    amplitude: np.ndarray
+    azimuth: np.ndarray
+    slant_range: np.ndarray
+    pulse: np.ndarray
 
 
 def beam_edge(
-    amplitudes: np.ndarray, azimuth: np.ndarray, slant_range: np.ndarray, first: np.ndarray, side: int,
-    places: np.ndarray, weight: Callable[[np.ndarray], np.ndarray], wavenumber: float, middle_range: float,
+    scatterers: EdgeScatterers, side: int, places: np.ndarray, weight: Callable[[np.ndarray], np.ndarray],
+    wavenumber: float, middle_range: float,
 ) -> np.ndarray:  # fmt: skip
-    """Samples at places on the track, m (n_p,), of scatterers seen from pulse `first` (n,) on, up to it if side is -1.
+    """Samples at places on the track, m (n_p,), of scatterers seen from their pulse on, up to it if side is -1.
 
     sum_k b_k weight(s) exp(-j 2 k (R - r_c)), complex128 (n_p,);  k the wavenumber, rad/m, r_c the middle range, m
     """
-    lag = places[:, None] - azimuth
-    distance = np.hypot(lag, slant_range)
-    seen = side * (np.arange(len(places))[:, None] - first) >= 0
+    lag = places[:, None] - scatterers.azimuth
+    distance = np.hypot(lag, scatterers.slant_range)
+    is_seen = side * (np.arange(len(places))[:, None] - scatterers.pulse) >= 0
     wave = np.exp(-2j * wavenumber * (distance - middle_range)) * weight((lag / distance).ravel()).reshape(lag.shape)
-    return np.asarray((wave * seen) @ amplitudes)
+    return np.asarray((wave * is_seen) @ scatterers.amplitude)
+
+
+class SarasNumbers(NamedTuple):
+    """Numbers of SARAS, equations (28) to (30); chi is the Doppler centroid over 2 a^2."""
+
+    a2: float
+    b2: float
+    eps: float
+    gamma2: float
+    beta_r: float
+    chi: float
 
 
 def saras_transfer(
-    xi: np.ndarray, eta: np.ndarray, a2: float, b2: float, eps: float, gamma2: float, beta_r: float, chi: float,
-    pattern: Callable[[np.ndarray], np.ndarray],
-) -> np.ndarray:  # fmt: skip
+    xi: np.ndarray, eta: np.ndarray, numbers: SarasNumbers, pattern: Callable[[np.ndarray], np.ndarray]
+) -> np.ndarray:
     """G of SARAS, equations (26) and (27), with d = 1; the azimuth terms have the sign of a numerical transform.
 
-    Variables are normalised as in (28) to (30): chi is the Doppler centroid over 2 a^2, pattern is w^2.
+    xi, eta  normalised as in (28) to (30);  pattern  w^2
     """
+    a2, b2, eps, gamma2, beta_r, chi = numbers
     coupling = 1 + eps * eta / (2 * b2)
     root = np.sqrt(coupling - 1.5 * gamma2 * xi**2 / (4 * a2**2))
     phase = -(eta**2) / (4 * b2) + chi * xi + xi**2 * (1 + beta_r) / (4 * a2 * coupling)

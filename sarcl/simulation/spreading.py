@@ -14,7 +14,7 @@ from ..base.errors import ToleranceUnreachable
 from ..base.morton import morton_order
 from ..numerics import cost_model
 from ..numerics.error_bounds import FLOAT32
-from ..numerics.plan import LEAST_TOLERANCE, Plan, carrier_steps, cheapest, least
+from ..numerics.plan import LEAST_TOLERANCE, Plan, ProfileSums, carrier_steps, cheapest, least
 from ..numerics.pulse_geometry import PulseGeometry
 from ..numerics.tiles import Tiles, tile_points
 from ..opencl.device import Buffer, Device
@@ -205,21 +205,13 @@ class TiledScatterers:
         n, radii = len(self), self.tiling.radii
         near = {size: list(zip(np.quantile(each, SHARES), SHARES, strict=True)) for size, each in radii.items()}
 
+        tiles = [(size, float(each.max())) for size, each in radii.items()]
+        distance, highest = antennas.distance(self.tiling.bounds), float(antennas.frequency.max()) + band.bandwidth / 2
+        chunk = _chunk(n, tolerance)
+        sums = ProfileSums(distance, highest, band.bandwidth, band.n_samples, n, chunk, band.carrier)
+
         def with_gain(gain: float) -> Plan:
-            return cheapest(
-                tolerance,
-                [(size, float(each.max())) for size, each in radii.items()],
-                near=near,
-                distance=antennas.distance(self.tiling.bounds),
-                frequency=float(antennas.frequency.max()) + band.bandwidth / 2,
-                bandwidth=band.bandwidth,
-                n_samples=band.n_samples,
-                points_per_row=n,
-                chunk=_chunk(n, tolerance),
-                least_tolerance=least_tolerance,
-                carrier=band.carrier,
-                image_gain=gain,
-            )
+            return cheapest(tolerance, tiles, sums, near=near, least_tolerance=least_tolerance, image_gain=gain)
 
         plan = with_gain(1.0)
         if not self._n_coherent:

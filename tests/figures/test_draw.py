@@ -200,8 +200,10 @@ def test_ticks_stand_at_round_values(low, high, most, ticks):
 
 
 def test_title_and_scale_are_outside_the_data():
-    plain = decibels.picture(speckle((64, 64)), (0.1, 0.1))
-    titled = decibels.picture(speckle((64, 64)), (0.1, 0.1), title="A title – with a dash, " + "long " * 60)
+    plain = decibels.picture(speckle((64, 64)), decibels.PixelAxes((0.1, 0.1)))
+    titled = decibels.picture(
+        speckle((64, 64)), decibels.PixelAxes((0.1, 0.1)), title="A title – with a dash, " + "long " * 60
+    )
     assert (data_of(plain) == data_of(titled)).all()
     assert titled.size[0] == plain.size[0] and titled.size[1] > plain.size[1]
 
@@ -213,7 +215,7 @@ def test_title_and_scale_are_outside_the_data():
 @pytest.mark.parametrize("spacing", [None, (0.1, 0.1)])
 def test_a_profile_is_a_line_that_peaks_where_the_data_do(shape, spacing):
     x = np.arange(101) - 30
-    picture = decibels.picture((-0.02 * x**2 + 12).reshape(shape), spacing, floor_db=-50)
+    picture = decibels.picture((-0.02 * x**2 + 12).reshape(shape), decibels.PixelAxes(spacing), floor_db=-50)
     left, top, right, bottom = picture.info["frame"]
     frame = np.asarray(picture.crop((left, top, right, bottom))).astype(int)
     blue = np.argwhere(frame[..., 2] - frame[..., 0] > 60)
@@ -224,16 +226,16 @@ def test_a_profile_is_a_line_that_peaks_where_the_data_do(shape, spacing):
 
 def test_a_profile_is_relative_to_its_maximum_or_to_the_level_given():
     profile = np.array([[-3.0, -20, -50, -70]])
-    made = decibels.picture(profile, (1, 0.1))
+    made = decibels.picture(profile, decibels.PixelAxes((1, 0.1)))
     assert made.info["top_db"] == -3.0 and made.info["caption"] == "Maximum: -3.0 dB."
-    given = decibels.picture(profile, (1, 0.1), top_db=10.0)
+    given = decibels.picture(profile, decibels.PixelAxes((1, 0.1)), top_db=10.0)
     assert given.info["top_db"] == 10.0 and given.info["caption"] == made.info["caption"]
 
 
 @pytest.mark.parametrize("n", [2, 3, 50_000])
 @pytest.mark.parametrize("value", [-np.inf, 0.0])
 def test_profiles_of_any_length_and_of_nothing_are_drawn(n, value):
-    assert decibels.picture(np.full((1, n), value), (1, 0.1)).size[0] > 500
+    assert decibels.picture(np.full((1, n), value), decibels.PixelAxes((1, 0.1))).size[0] > 500
 
 
 # Files and refusals ----------------------------------------------------------------------------------------
@@ -275,7 +277,7 @@ def test_a_picture_that_cannot_be_written_leaves_nothing(tmp_path):
         (np.zeros((2, 2)), {"floor_db": 0}, "floor_db is 0"),
         (np.zeros((2, 2)), {"floor_db": 20}, "give e.g. -50"),
         (np.zeros((2, 2)), {"floor_db": np.nan}, "floor_db is nan"),
-        (np.zeros((2, 2)), {"spacing": (0.1, 0)}, r"spacing\[1\] is 0"),
+        (np.zeros((2, 2)), {"axes": decibels.PixelAxes((0.1, 0))}, r"spacing\[1\] is 0"),
         (np.zeros((2, 2)), {"top_db": np.inf}, "top_db is inf"),
         (np.zeros((2, 2)), {"percentile": 0}, "percentile is 0"),
         (np.zeros((2, 2)), {"percentile": 101}, "percentile is 101; give at most 100"),

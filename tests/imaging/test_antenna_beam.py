@@ -11,6 +11,7 @@ import sarcl
 from sarcl.imaging import choose_method
 from sarcl.imaging.focusing_task import make_task
 from sarcl.model.antenna_pattern import two_way_gain
+from sarcl.reference.backproject import PerPoint
 from sarcl.reference.backproject import backproject as exact
 
 N = 240
@@ -53,7 +54,7 @@ def gains(raw, antenna, points, axes):
 def compare(image, raw, g):
     """Relative errors of an image and of its gain against the float64 twin, at the pixels of g (index, (n, n_rows))."""
     (index, points), g = g
-    wanted, norm = exact(raw, points, None, None, False, None, 0.0, g.conj())
+    wanted, norm = exact(raw, points, None, None, False, None, 0.0, PerPoint(g.conj()))
     error = np.linalg.norm(np.asarray(image.data)[index] - wanted) / max(norm, np.linalg.norm(wanted))
     wanted = (np.abs(g) ** 2).sum(axis=1) * raw.n_samples
     return error, np.abs(image.gain[index] / wanted - 1).max()

@@ -14,6 +14,7 @@ from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.imaging.focusing_task import make_task
 from sarcl.imaging.pixel_taper import PixelTaper
 from sarcl.numerics.windows import weights
+from sarcl.reference.backproject import PerPoint
 from sarcl.reference.backproject import backproject as exact
 
 TAYLOR = ("taylor", 35, 5)
@@ -44,7 +45,7 @@ def compare(image, raw, window, most=60):
     across, along = window if isinstance(window, tuple) and len(window) == 2 else (window, window)
     index, points = image.grid.sample(most, seed=3)
     share, sample_weight = shares(points, along, raw), weights(across, raw.n_samples)
-    wanted, norm = exact(raw, points, sample_weight, None, False, strip_map.BEAM, 1e-6, share)
+    wanted, norm = exact(raw, points, sample_weight, None, False, strip_map.BEAM, 1e-6, PerPoint(share))
     clear = np.isfinite(wanted)
     gain = sample_weight.sum() * share.sum(axis=1)
     error = np.linalg.norm((np.asarray(image.data)[index] - wanted)[clear]) / max(np.linalg.norm(wanted[clear]), norm)
@@ -97,7 +98,7 @@ def test_rows_of_other_weights_times_and_channels(raw):
             continue
         first, last = place[rows].min(), place[rows].max()
         share[i] = rows * np.cos(np.pi * ((place - first + 0.5) / (last - first + 1) - 0.5)) ** 2
-    wanted, norm = exact(mixed, points, None, weight, False, strip_map.BEAM, 0.0, share)
+    wanted, norm = exact(mixed, points, None, weight, False, strip_map.BEAM, 0.0, PerPoint(share))
     assert np.linalg.norm(image.data[index] - wanted) <= 1e-8 * max(norm, np.linalg.norm(wanted))
     assert image.gain[index] == pytest.approx(raw.n_samples * share @ weight, rel=1e-9)
 
@@ -151,7 +152,7 @@ def test_the_entropy_is_that_of_an_exactly_tapered_sum(scenes):
     points = grid.positions.reshape(-1, 3)
     share = shares(points, TAYLOR, echoes)
     wanted, _ = exact(
-        echoes, points, weights(TAYLOR, echoes.n_samples), None, False, strip_map.BEAM, 0.0, share
+        echoes, points, weights(TAYLOR, echoes.n_samples), None, False, strip_map.BEAM, 0.0, PerPoint(share)
     )  # fmt: skip
 
     def entropy(values):

@@ -389,7 +389,7 @@ def test_a_picture_needs_no_more_room_than_is_looked_for(shape):
     random = np.random.default_rng(0)
     noise = 20 * np.log10(np.abs(random.normal(size=shape) + 1j * random.normal(size=shape)))
     file = io.BytesIO()
-    decibels.picture(noise, (0.1, 0.1)).save(file, format="PNG")
+    decibels.picture(noise, decibels.PixelAxes((0.1, 0.1))).save(file, format="PNG")
     assert len(file.getvalue()) <= decibels.picture_bytes(shape, (0.1, 0.1))
 
 

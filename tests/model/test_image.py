@@ -138,10 +138,9 @@ def test_a_picture_of_range_doppler_has_axes_in_metres(monkeypatch):
     monkeypatch.setattr(decibels, "picture", lambda *a, **k: asked.append((a, k)) or real(*a, **k))
     grid = by_time_and_range()
     sarcl.Image(noise_of(grid.shape), grid).show()
-    (_, spacing, _, _), options = asked[0]
-    assert spacing == pytest.approx((2.0, 1.0))
-    assert options["origin"] == (0.0, 0.0)
-    assert options["names"] == ("along the track", "slant range less 5007 m")
+    (_, axes, _, _), _ = asked[0]
+    assert axes.spacing == pytest.approx((2.0, 1.0)) and axes.origin == (0.0, 0.0)
+    assert axes.names == ("along the track", "slant range less 5007 m")
 
 
 def test_multilook_leaves_speckle_of_one_over_root_n():

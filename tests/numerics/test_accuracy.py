@@ -178,10 +178,10 @@ def test_images_keep_off_the_carrier(error, carrier):
 
 
 def test_tiles_that_float32_carries_are_computed_in_it_and_their_error_counts():
-    problem = {"distance": 1e4, "frequency": 9.7e9, "bandwidth": 150e6, "n_samples": 300, "points_per_row": 10**6}
+    sums = plan.ProfileSums(1e4, 9.7e9, 150e6, n_samples=300, points_per_row=10**6, chunk=10**4)
     tiles = [(256, 175.0)]
-    alone = plan.cheapest(1e-2, tiles, chunk=10**4, **problem)
-    made = plan.cheapest(1e-2, tiles, chunk=10**4, near={256: [(4.0, 0.9), (20.0, 0.98)]}, **problem)
+    alone = plan.cheapest(1e-2, tiles, sums)
+    made = plan.cheapest(1e-2, tiles, sums, near={256: [(4.0, 0.9), (20.0, 0.98)]})
     assert alone.near.order == 0 and made.near.radius == 20.0 and made.cost < alone.cost - 0.5
     assert (made.range_mode, made.order) == (alone.range_mode, alone.order)
     float32 = error_bounds.range_error(20.0, 1e4, 9.7e9, 150e6, 0, made.near.order)

@@ -25,7 +25,7 @@ def test_sums_in_float64_are_those_of_the_reference_and_count_what_is_seen():
     ends = np.stack([seen_from(9e3, 0.5, a) for a in (0.0, 0.1)])
     reference = np.linalg.norm(ends, axis=1)
     antennas = PulseGeometry.sampled(
-        ends, ends, reference, first=frequencies[0], step=1e6, n_samples=4, near=-5.0, far=5.0
+        ends, ends, reference, first=frequencies[0], step=1e6, n_samples=4, window=(-5.0, 5.0)
     )
     part = FacetSet(
         scene.triangles, scene.reflectivity, scene.two_sided, scene.material, scene.materials, None, np.arange(6),

@@ -22,14 +22,12 @@ def seen_from(distance, elevation, azimuth):
 
 
 @pytest.mark.parametrize("distance", [1e3, 1e5])
-def test_echo_of_a_tilted_plate_does_not_depend_on_nodes_or_on_how_it_is_cut(distance):
+def test_echo_of_a_tilted_plate_does_not_depend_on_how_it_is_cut(distance):
     target, tx, rx = plate(5.0, np.radians(20)), seen_from(distance, 0.1, 0.4), seen_from(distance, 0.3, -0.2)
     normal_incidence = 2 * np.sqrt(np.pi) * 25 * BAND.max() / SPEED_OF_LIGHT
     wanted = facet.facet_echo(target, 6 - 1j, BAND, tx, rx, distance)
-    more = facet.facet_echo(target, 6 - 1j, BAND, tx, rx, distance, extra_nodes=50)
-    cut = facet.facet_echo(quarters(target), 6 - 1j, BAND, tx, rx, distance)
+    cut = facet.facet_echo(quarters(target), 6 - 1j, BAND, tx, rx, distance)  # nodes lie at more than twice the density
     assert np.abs(wanted).min() > 1e-8 * normal_incidence
-    assert np.abs(more - wanted).max() < 1e-11 * normal_incidence
     assert np.abs(cut - wanted).max() < 1e-11 * normal_incidence
 
 

@@ -189,7 +189,7 @@ def test_profiles_are_moved_and_interpolated_between_pulses_as_by_the_twin(devic
     raw = factorized_echo(scene, positions, 1e-2, device=device)
     antennas = PulseGeometry.sampled(
         raw.tx, raw.tx, raw.reference_range, first=raw.frequency[0], step=raw.frequency_step[0],
-        n_samples=raw.n_samples, near=-1e3, far=1e3,
+        n_samples=raw.n_samples, window=(-1e3, 1e3),
     )  # fmt: skip
     cells = ScattererCells(scene.positions)
     plan = plan_levels(

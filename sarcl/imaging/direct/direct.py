@@ -12,7 +12,7 @@ from ...base.stage_timer import Clock
 from ...blocks.bands import FlatArray
 from ...numerics import cost_model
 from ...numerics.cost_model import CPU, DeviceClass
-from ...numerics.plan import Plan, cheapest
+from ...numerics.plan import Plan, ProfileSums, cheapest
 from ...numerics.tiles import Tiles
 from ...opencl.device import Buffer, Device
 from ..antenna_beam import AntennaOnDevice
@@ -47,15 +47,11 @@ def make_plan(task: FocusingTask, tolerance: float, devices: DeviceClass = CPU) 
     if by_lines is not None and by_lines.cost < LEAST_COST:
         return by_lines, LineTiling(grid, by_lines.side)
     tilings = {side**2: tiling_of(grid, side) for side in (32, 16, 8)}
+    distance, n_samples = task.antennas.distance(grid.bounds), task.raw.n_samples
     plan = cheapest(
         tolerance,
         [(n, tiling.radius) for n, tiling in tilings.items() if n == 64 or task.resolves_beam(tiling.radius)],
-        distance=task.antennas.distance(grid.bounds),
-        frequency=task.highest,
-        bandwidth=task.bandwidth,
-        n_samples=task.raw.n_samples,
-        points_per_row=grid.size,
-        chunk=CHUNK,
+        ProfileSums(distance, task.highest, task.bandwidth, n_samples, grid.size, CHUNK),
         least_tolerance=0.0,
         gathering=devices.gathering,
         native_error=devices.native_error if devices.native_pays(tolerance) else None,

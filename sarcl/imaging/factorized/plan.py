@@ -14,7 +14,7 @@ from ...base.errors import ToleranceUnreachable
 from ...numerics import cost_model, error_bounds, interpolation
 from ...numerics.cost_model import CPU, DeviceClass
 from ...numerics.interpolation import Interpolator
-from ...numerics.plan import Plan, cheapest
+from ...numerics.plan import Plan, ProfileSums, cheapest
 from ...numerics.pulse_geometry import PulseGeometry
 from ...numerics.subapertures import Decimation, decimated, filter_error, rate
 from ...opencl import fft
@@ -296,17 +296,8 @@ class _Case:
         if self.lines:
             return line_plan.choose(self.task, self.task.antennas, self.tolerance, sides=(tiling.side,))
         try:
-            return cheapest(
-                self.tolerance,
-                [(tiling.per_tile, tiling.radius)],
-                distance=self.distance,
-                frequency=self.highest,
-                bandwidth=self.bandwidth,
-                n_samples=raw.n_samples,
-                points_per_row=self.task.grid.size,
-                chunk=CHUNK,
-                least_tolerance=0.0,
-            )
+            sums = ProfileSums(self.distance, self.highest, self.bandwidth, raw.n_samples, self.task.grid.size, CHUNK)
+            return cheapest(self.tolerance, [(tiling.per_tile, tiling.radius)], sums, least_tolerance=0.0)
         except ToleranceUnreachable:
             return None
 

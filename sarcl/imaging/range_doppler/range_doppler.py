@@ -139,17 +139,17 @@ def _measure_error(raw: PhaseHistory, task: RangeDopplerTask, grid: ImageGrid, d
 
     Ranges are those of the geometry, and longer by what the plan's hyperbolas have more than those of the geometry.
     """
+    from ...reference.backproject import PerPoint
     from ...reference.backproject import backproject as exact
 
     index, points = grid.sample(CHECKED, seed=0)
     plan, track = task.plan, task.track
     u, r = plan.times[index[0]], plan.ranges[index[1]]
-    share = _row_weights(track, plan, u, r, task.wavelength)
-    longer = None
+    terms = PerPoint(_row_weights(track, plan, u, r, task.wavelength))
     if plan.fit is not task.known:
         t = track.times[:, None]
-        longer = (plan.fit.range(u, r, t) - task.known.range(u, r, t)).T
-    truth, random = exact(raw, points, task.sample_weight, task.row_weight, wrap=True, share=share, longer=longer)
+        terms = terms._replace(longer=(plan.fit.range(u, r, t) - task.known.range(u, r, t)).T)
+    truth, random = exact(raw, points, task.sample_weight, task.row_weight, wrap=True, per_point=terms)
     return relative_error(data[index], truth, random)
 
 

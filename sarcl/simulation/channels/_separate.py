@@ -62,10 +62,9 @@ class ChannelLayout:
         window: tuple[float, float] | None = None,
     ) -> PulseGeometry:
         """Geometry of echoes between tx and rx, m (n, 3), at frequencies, Hz; window  (near, far), default `window`."""
-        near, far = self.window if window is None else window
         return PulseGeometry.sampled(
             tx, rx, reference_range, first=float(frequencies[0]), step=self.grid.step, n_samples=len(frequencies),
-            near=near, far=far,
+            window=self.window if window is None else window,
         )  # fmt: skip
 
     def shape(self, n_pulses: int) -> tuple[int, ...]:

@@ -69,7 +69,7 @@ def spectral_task(
     near, far = echo_sampling.window(real, waveform, tx, tx, reference_range, options.range_window)
     frequency, step, n_samples = echo_sampling.sampling(waveform, near, far, options.compressed)
     antennas = PulseGeometry.sampled(
-        tx, tx, reference_range, first=frequency, step=step, n_samples=n_samples, near=near, far=far
+        tx, tx, reference_range, first=frequency, step=step, n_samples=n_samples, window=(near, far)
     )
     return SpectralTask(
         options=options,

@@ -120,11 +120,10 @@ def test_the_map_of_an_edge_is_the_sum_over_scatterers_and_pulses(side, device):
             rest = np.where(side * s < 0, 1 - seen.window(s), 0)
             return rest * functions(s, 0.0)[term]
 
+        scatterers = twin.EdgeScatterers(b, azimuth[places.picked], slant_range[places.picked], places.pulse)
+        track = np.arange(line.n_pulses) * line.spacing
         for i, one in enumerate(f.tolist()):
-            wanted = twin.beam_edge(
-                b, azimuth[places.picked], slant_range[places.picked], places.pulse, side,
-                np.arange(line.n_pulses) * line.spacing, weight, float(wavenumber(one)), 1e4,
-            )  # fmt: skip
+            wanted = twin.beam_edge(scatterers, side, track, weight, float(wavenumber(one)), 1e4)
             assert np.linalg.norm(samples[i, : line.n_pulses] - wanted) <= 3e-4 * np.linalg.norm(wanted)
 
 

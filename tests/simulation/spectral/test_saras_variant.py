@@ -70,7 +70,8 @@ def test_the_centroid_chi_is_a_linear_phase_and_a_shift_of_the_pattern(chi, t):
 
     numerical = np.sum(pattern(p) * np.exp(-1j * ((a2 + eta * mu) * path + xi * p))) * (p[1] - p[0])
     numerical *= np.exp(-1j * eta**2 / (4 * b2))
-    found = twin.saras_transfer(np.array(xi), np.array(eta), a2, b2, eps, 0.0, 0.0, chi, pattern)
+    numbers = twin.SarasNumbers(a2, b2, eps, 0.0, 0.0, chi)
+    found = twin.saras_transfer(np.array(xi), np.array(eta), numbers, pattern)
     # what the paper calls inessential: sqrt(pi/a^2) exp(-j pi/4), and the phase a^2 chi^2 (1 + eps eta/2b^2)
     found = found * np.sqrt(np.pi / a2) * np.exp(1j * (a2 * chi**2 * (1 + eps * t) - np.pi / 4))
     assert abs(np.angle(found / numerical)) < 0.03 and abs(found / numerical) == pytest.approx(1, abs=0.08)

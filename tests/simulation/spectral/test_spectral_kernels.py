@@ -89,7 +89,8 @@ def test_kernels_are_their_twins(task):
     padded[:, plan.n_range - plan.origin :] = over[:, : plan.origin]
     wanted = np.concatenate([
         twin.migrate(
-            np.fft.fft(padded[part]), *coordinates, transfer.tables[0, 0], transfer.basis(f), plan.kernel
+            np.fft.fft(padded[part]), twin.Coordinates(*coordinates), transfer.tables[0, 0], transfer.basis(f),
+            plan.kernel,
         )
         for part, coordinates in held.coordinates(transfer, f, whole, 1e9)
     ])  # fmt: skip
