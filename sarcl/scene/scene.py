@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..base import arguments, validation
+from ..base import validation
 from ..base.boxes import box
 from ..base.errors import warn
-from . import terrain
+from . import _changes, terrain
 from . import triangles as geometry
 from ._kept import Kept
 from .material import FacetMaterials, Material, MaterialLike, checked_table, merge, resolve
@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     from ..base.types import PathLike
 
 log = logging.getLogger(__name__)
-
-POINT_HEIGHTS = 1  # stream of random numbers; stream 0 is that of the facets' heights
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +84,7 @@ class Scene:
         if self.material is None:
             object.__setattr__(self, "material", np.broadcast_to(np.int32(0), (k,)))
         if self.point_roughness is None:
-            object.__setattr__(self, "point_roughness", _no_displacements(k))
+            object.__setattr__(self, "point_roughness", _changes.no_displacements(k))
         shapes = {"positions": (n, 3), "triangles": (k, 3, 3), "amplitudes": (n,), "point_roughness": (k, 3, 3)}
         dtypes = {"amplitudes": np.complex128, "two_sided": np.bool_, "material": np.int32}
         for name in _ARRAYS:
@@ -153,7 +151,7 @@ class Scene:
             "roughness": terrain.spread("roughness", roughness, (k,)),
             "two_sided": terrain.spread("two_sided", two_sided, (k,), np.bool_),
             "material": index,
-            "point_roughness": _no_displacements(k),
+            "point_roughness": _changes.no_displacements(k),
         }
         if point_roughness is not None:
             parts["point_roughness"] = validation.array("point_roughness", point_roughness, np.float64, (k, 3, 3))
@@ -333,112 +331,13 @@ class Scene:
         """Centre of that box, m (3,)."""
         return self.bounds.mean(axis=0)
 
-    def height_at(self, x: float, y: float) -> float:
-        """Height of the highest facet at (x, y), m, in a frame whose z points up. ValueError where there is none."""
-        x, y = validation.number("x", x), validation.number("y", y)
-        z = geometry.highest(self.triangles, x, y)
-        if z is None:
-            low, high = self.bounds
-            raise ValueError(
-                f"no facet lies at x {x:g}, y {y:g} m; the scene reaches from ({low[0]:g}, {low[1]:g}) to "
-                f"({high[0]:g}, {high[1]:g})"
-            )
-        return z
-
-    def on(self, ground: Scene, x: float, y: float, *, depth: float = 0.0) -> Scene:
-        """This scene moved so that its origin is over (x, y) and its lowest point `depth` m under `ground` there.
-
-        Composites are sums: ``ground + tank.on(ground, 10, -5)``. ValueError where there is no ground at (x, y).
-        """
-        validation.instance("ground", ground, Scene)
-        rise = ground.height_at(x, y) - float(self.bounds[0, 2]) - validation.number("depth", depth)
-        return self.moved((x, y, rise))
-
-    def moved(self, by: ArrayLike) -> Scene:
-        """This scene moved by a vector, m (3,)."""
-        by = validation.array("by", by, np.float64, (3,))
-        positions, triangles = validation.sealed(self.positions + by), validation.sealed(self.triangles + by)
-        heights = self.heights
-        if heights is not None:
-            x, y, z = (validation.sealed(values + step) for values, step in zip(heights, by, strict=True))
-            heights = x, y, z
-        return replace(self, positions=positions, triangles=triangles, heights=heights)
-
-    def on_earth(self, longitude: float, latitude: float, height: float = 0.0) -> Scene:
-        """This scene, in x east, y north, z up of a place, in Earth-fixed coordinates, as for echoes of an orbit.
-
-        longitude, latitude, height   of the place, degrees and m above the ellipsoid
-
-        Terrain of from_heights has its shadows computed by rays afterwards, as other facets have. ValueError for angles
-        that are no place.
-        """
-        from ..earth.place import Place
-
-        place = Place(longitude, latitude, height)
-        moved: dict[str, Any] = {
-            n: validation.sealed(place.positions(getattr(self, n))) for n in ("positions", "triangles")
-        }
-        if self.has_random_points:
-            moved["point_roughness"] = validation.sealed(np.asarray(self.point_roughness @ place.axes))
-        return replace(self, heights=None, **moved)
-
-    def realized(self, seed: int = 0) -> Scene:
-        """One realization of the surface that point_roughness describes: corners are moved by seeded Gaussian numbers.
-
-        The number is a hash of the seed and the corner's position, so facets that share a corner stay joined, and
-        neither order nor neighbours matter. Scenes without point_roughness are returned as they are.
-        """
-        seed = validation.count("seed", seed, 0)
-        if not self.has_random_points:
-            return self
-        return self.kept.of(("realized", seed), lambda: self._realized(seed))
+    height_at, on, moved, on_earth = _changes.height_at, _changes.on, _changes.moved, _changes.on_earth
+    realized, part, split = _changes.realized, _changes.part, _changes.split
 
     @cached_property
     def kept(self) -> Kept:
         """Results that follow from the scene alone, which calls of the verbs share; for the library's own use."""
         return Kept()
 
-    def _realized(self, seed: int) -> Scene:
-        from ..base.counter_rng import gaussian
 
-        random = gaussian(self.triangles.reshape(-1, 3), seed, POINT_HEIGHTS).reshape(-1, 3, 1)
-        moved = validation.sealed(self.triangles + random * self.point_roughness)
-        heights = None if self.heights is None else terrain.raised(self.heights, self.triangles, moved)
-        return replace(self, triangles=moved, point_roughness=_no_displacements(len(moved)), heights=heights)
-
-    def part(self, which: np.ndarray) -> Scene:
-        """The scene with only those of its facets for which `which`, bool (k,), is True."""
-        which = arguments.chosen("which", which, len(self.triangles), "facets")
-        parts: dict[str, Any] = {n: validation.sealed(getattr(self, n)[which]) for n in _FACET_ARRAYS}
-        return replace(self, **parts)
-
-    def split(self, max_edge: float, max_facets: int = 50_000_000) -> Scene:
-        """The same surface with facets bisected at their longest edge until none is longer than max_edge, m.
-
-        Raises MemoryError when more than `max_facets` would result, ValueError for point_roughness not yet realized.
-        """
-        max_edge = validation.number("max_edge", max_edge, above=0)
-        max_facets = validation.count("max_facets", max_facets)
-        if len(self.triangles) == 0:
-            return self
-        if self.has_random_points:
-            raise ValueError(
-                "point_roughness is one random height per grid point, and cutting facets would add points; "
-                "call scene.realized(seed) first"
-            )
-        triangles, row = geometry.cut(self.triangles, max_edge, max_facets)
-        belongs: dict[str, Any] = {
-            n: validation.sealed(getattr(self, n)[row]) for n in ("reflectivity", "roughness", "two_sided", "material")
-        }
-        return replace(
-            self, triangles=validation.sealed(triangles), point_roughness=_no_displacements(len(row)), **belongs
-        )
-
-
-_ARRAYS = tuple(n for n in Scene.__dataclass_fields__ if n not in ("materials", "heights"))
-_FACET_ARRAYS = tuple(n for n in _ARRAYS if n not in ("positions", "amplitudes"))
-
-
-def _no_displacements(k: int) -> np.ndarray:
-    """Zero displacements for k facets, which occupy no memory."""
-    return np.broadcast_to(0.0, (k, 3, 3))
+_ARRAYS = ("positions", "amplitudes", *_changes.FACET_ARRAYS)
