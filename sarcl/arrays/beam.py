@@ -56,9 +56,7 @@ def beam(
     tolerance = validation.tolerance(tolerance)
     t = validation.converted("times", times, np.float64)
     validation.finite("times", t)
-    x = validation.converted("positions", positions, np.float64)
-    if x.ndim == 0 or x.shape[-1] != 3:
-        raise ValueError(f"positions has shape {x.shape}, wanted (..., 3)")
+    x = validation.vectors("positions", positions)
     validation.finite("positions", x)
     origin = validation.array("reference", reference, np.float64, (3,))
     opened = open_device(device)

@@ -8,7 +8,7 @@ For other folders:
     counter_rng   random numbers computed from a seed and a counter: independent of order and blocks
     errors        warnings and errors of the library; a warning points to the user's line that called it
     fingerprint   checksums of everything that a result depends on
-    float_pairs   float64 as pairs of float32, for kernels on devices without float64
+    float_pairs   sums with their rounding error; float64 as pairs of float32, for devices without float64
     forecast      Forecast: what a verb would do; Plan: what it carries out
     host_memory   memory of the machine, and arrays in temporary files
     morton        Morton order: neighbours in space become neighbours in memory

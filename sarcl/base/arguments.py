@@ -9,6 +9,8 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .text import shown
+
 if TYPE_CHECKING:
     import numpy as np
 
@@ -38,7 +40,7 @@ def text(name: str, value: object) -> str | None:
 def progress(value: object, called: str = "progress(stage, done, total)") -> Any:
     """`value` where it is None or can be called; TypeError otherwise."""
     if value is not None and not callable(value):
-        raise TypeError(f"progress is {_shown(value)}; give a function, which is called as {called}, or None")
+        raise TypeError(f"progress is {shown(value)}; give a function, which is called as {called}, or None")
     return value
 
 
@@ -50,7 +52,7 @@ def checked_index(name: str, what: str, value: Any, shape: tuple[int, ...]) -> N
         np.broadcast_to(np.False_, shape)[value]
     except (IndexError, TypeError, ValueError):
         raise IndexError(
-            f"{name} is {_shown(value)}, which is no index of {what} of shape {shape}; give whole numbers within it, "
+            f"{name} is {shown(value)}, which is no index of {what} of shape {shape}; give whole numbers within it, "
             "slices, or a mask of its shape"
         ) from None
 
@@ -65,11 +67,7 @@ def chosen(name: str, value: Any, n: int, what: str) -> np.ndarray:
         made = None
     if made is None or made.ndim != 1:
         raise IndexError(
-            f"{name} is {_shown(value)}, which chooses none of {n} {what}; give a slice, whole numbers from {-n} to "
+            f"{name} is {shown(value)}, which chooses none of {n} {what}; give a slice, whole numbers from {-n} to "
             f"{n - 1}, or a mask of {n} values True and False"
         )
     return made
-
-
-def _shown(value: object) -> str:
-    return f"{' '.join(repr(value).split()):.60}"

@@ -32,9 +32,16 @@ def _gaussian(places: np.ndarray, seed: int, stream: int) -> np.ndarray:
         state = np.full(len(places), start_of(seed, stream))
         for axis in np.rint(places.T * 1e6).astype(np.int64).view(np.uint64):
             state = mix(state ^ axis)
+    power, cycles = polar(state)
+    return np.asarray(np.sqrt(2 * power) * np.cos(2 * np.pi * cycles))
+
+
+def polar(state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Squared modulus, exponential of mean 1, and phase, uniform cycles, of a complex normal number of each state."""
+    with np.errstate(over="ignore"):
         first, second = mix(state), mix(state + np.uint64(GOLDEN))
-    radius = np.sqrt(-2 * np.log((first >> np.uint64(11)).astype(np.float64) * 2.0**-53 + 2.0**-54))
-    return np.asarray(radius * np.cos(2 * np.pi * (second >> np.uint64(11)).astype(np.float64) * 2.0**-53))
+    power = -np.log((first >> np.uint64(11)).astype(np.float64) * 2.0**-53 + 2.0**-54)
+    return power, (second >> np.uint64(11)).astype(np.float64) * 2.0**-53
 
 
 def start_of(seed: int, stream: int) -> np.uint64:

@@ -1,8 +1,17 @@
-"""Numbers as pairs of float32, for kernels on devices without float64."""
+"""Sums of two numbers: with their rounding error, and float64 as pairs of float32 for devices without float64."""
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+
+
+def exact_sum(a: Any, b: Any) -> tuple[Any, Any]:
+    """a + b, rounded, and its rounding error, in their number type (Knuth 1969)."""
+    total = a + b
+    part = total - a
+    return total, (a - (total - part)) + (b - part)
 
 
 def wide(values: np.ndarray) -> np.ndarray:

@@ -45,6 +45,11 @@ def unknown(key: str, known: list[str], what: str) -> str:
     return f"unknown {what} {key!r}{guess} known: {', '.join(known)}"
 
 
+def shown(value: object, most: int = 60) -> str:
+    """A value as Python writes it, on one line, at most so many characters."""
+    return f"{' '.join(repr(value).split()):.{most}}"
+
+
 def first_line(error: BaseException) -> str:
     """First line of the message of an error, at most 200 characters; the name of its class when it has none."""
     text = str(error).strip()

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from .host_memory import installed
-from .text import size_text
+from .text import shown, size_text
 
 NUMBERS = SupportsComplex | SupportsFloat | SupportsIndex  # None is none of these; classes of numbers look like them
 LARGEST_TOLERANCE = 0.3  # relative error; noise of a tenth of the signal's power
@@ -31,19 +31,25 @@ def array(name: str, value: object, dtype: DTypeLike, shape: tuple[int | str, ..
     return sealed(out)
 
 
+def each(name: str, value: object, n: int) -> np.ndarray:
+    """`value` as finite numbers (n,), of one number for all or one for each."""
+    if ndim(name, value) == 0:
+        value = np.full(n, number(name, value))
+    return array(name, value, np.float64, (n,))
+
+
 def ndim(name: str, value: Any) -> int:
     """Number of axes of a value; ValueError where it is a list of lists of different lengths."""
     try:
         return int(np.ndim(value))
     except ValueError:
-        shown = " ".join(repr(value).split())
-        raise ValueError(f"{name} is {shown:.60}, whose rows differ in length; give rows of equal length") from None
+        raise ValueError(f"{name} is {shown(value)}, whose rows differ in length; give rows of equal length") from None
 
 
 def flag(name: str, value: object) -> bool:
     """`value` as True or False; TypeError for anything but these, 1 and 0."""
     if not isinstance(value, (bool, np.bool_, int, np.integer)) or value not in (0, 1):
-        raise TypeError(f"{name} is {' '.join(repr(value).split()):.60}; give True or False")
+        raise TypeError(f"{name} is {shown(value)}; give True or False")
     return bool(value)
 
 
@@ -53,7 +59,7 @@ def flags(name: str, value: object) -> Any:
     if given is None:
         return flag(name, value)
     if given.dtype.kind not in "biuf" or not ((given == 0) | (given == 1)).all():
-        raise TypeError(f"{name} is {' '.join(repr(value).split()):.60}; give True or False for each")
+        raise TypeError(f"{name} is {shown(value)}; give True or False for each")
     return value
 
 
@@ -73,6 +79,14 @@ def without_unit(name: str, value: object) -> None:
 def values(name: str, value: object, dtype: DTypeLike = np.float64) -> np.ndarray:
     """`value` of any shape as an array of `dtype`, NaN and Inf left in it; ValueError for what are no numbers."""
     return np.asarray(value) if type(value) is float else converted(name, value, dtype)
+
+
+def vectors(name: str, value: object) -> np.ndarray:
+    """`value` as vectors (..., 3), float64, NaN and Inf left in them; ValueError for another shape."""
+    out = values(name, value)
+    if out.shape[-1:] != (3,):
+        raise ValueError(f"{name} has shape {out.shape}, wanted (..., 3)")
+    return out
 
 
 def room(what: str, n_bytes: float, remedy: str) -> None:
@@ -116,11 +130,9 @@ def converted(name: str, value: object, dtype: DTypeLike) -> np.ndarray:
             raise _NoNumbers("not all are small enough")
         return made
     except (TypeError, ValueError, OverflowError) as exc:
-        shown = " ".join(repr(value).split())
-        small = isinstance(exc, OverflowError)
-        why = "not all are small enough" if small else "not all are numbers"
+        why = "not all are small enough" if isinstance(exc, OverflowError) else "not all are numbers"
         why = str(exc) if isinstance(exc, _NoNumbers) else why
-        raise ValueError(f"{name} must be numbers that fit {wanted}, got {shown:.80} ({why})") from None
+        raise ValueError(f"{name} must be numbers that fit {wanted}, got {shown(value, 80)} ({why})") from None
 
 
 def unmasked(name: str, value: object, first_row: int = 0, remedy: str = "fill them, with 0 where nothing came") -> Any:
@@ -132,10 +144,9 @@ def unmasked(name: str, value: object, first_row: int = 0, remedy: str = "fill t
         return value
     mask = np.ma.getmaskarray(value)
     if mask.any():
-        at = [int(i) for i in np.unravel_index(int(np.argmax(mask)), mask.shape)]
-        at[:1] = [at[0] + first_row] if at else []
+        place = first(mask, first_row)[1] or "[]"
         raise ValueError(
-            f"{name} has {int(mask.sum())} masked values, the first at {at}, which are no measurements; {remedy}: "
+            f"{name} has {int(mask.sum())} masked values, the first at {place}, which are no measurements; {remedy}: "
             f"{name}.filled(0)"
         )
     return value.data
@@ -143,14 +154,17 @@ def unmasked(name: str, value: object, first_row: int = 0, remedy: str = "fill t
 
 def finite(name: str, value: np.ndarray, first_row: int = 0) -> None:
     """Raise ValueError naming the first NaN or Inf in `value`; rows are counted from `first_row`."""
-    good = np.isfinite(value)
-    if not good.all():
-        at = list(np.unravel_index(int(np.argmin(good)), value.shape))
-        bad = value[tuple(at)]
-        if at:
-            at[0] += first_row
-        index = f"[{', '.join(str(int(i)) for i in at)}]" if at else ""
-        raise ValueError(f"{name}{index} is {bad}; every value must be finite: remove or replace it")
+    is_finite = np.isfinite(value)
+    if not is_finite.all():
+        index, place = first(~is_finite, first_row)
+        raise ValueError(f"{name}{place} is {value[index]}; every value must be finite: remove or replace it")
+
+
+def first(mask: np.ndarray, first_row: int = 0) -> tuple[tuple[int, ...], str]:
+    """Index of the first True of a mask, and its text, such as "[2, 0]", with rows counted from `first_row`."""
+    index = tuple(int(i) for i in np.unravel_index(int(np.argmax(mask)), mask.shape))
+    places = (index[0] + first_row, *index[1:]) if index else ()
+    return index, f"[{', '.join(map(str, places))}]" if index else ""
 
 
 def number(name: str, value: Any, *, above: float | None = None, least: float | None = None) -> float:
@@ -222,9 +236,7 @@ def instance(name: str, value: object, kind: type) -> None:
 def choice(name: str, value: object, allowed: tuple[str, ...]) -> str:
     """Return `value` if it is one of `allowed`."""
     if not isinstance(value, str) or value not in allowed:
-        raise ValueError(
-            f"{name} is {' '.join(repr(value).split()):.60}; choose one of {', '.join(map(repr, allowed))}"
-        )
+        raise ValueError(f"{name} is {shown(value)}; choose one of {', '.join(map(repr, allowed))}")
     return str(value)
 
 

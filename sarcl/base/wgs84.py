@@ -77,10 +77,7 @@ def geodetic(positions: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.floa
     equally near. The longitude on the axis is 0.
     Source: C. F. F. Karney, Geodesics on an ellipsoid of revolution, arXiv:1102.1215, appendix B.
     """
-    positions = validation.values("positions", positions)
-    if positions.ndim == 0 or positions.shape[-1] != 3:
-        raise ValueError(f"positions has shape {positions.shape}, wanted (..., 3)")
-    x, y, z = np.moveaxis(positions, -1, 0)
+    x, y, z = np.moveaxis(validation.vectors("positions", positions), -1, 0)
     e2, e4, rest = ECCENTRICITY_SQUARED, ECCENTRICITY_SQUARED**2, 1 - ECCENTRICITY_SQUARED
     across = np.hypot(x, y)
     p, q = (across / SEMI_MAJOR) ** 2, rest * (z / SEMI_MAJOR) ** 2

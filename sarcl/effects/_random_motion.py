@@ -14,9 +14,7 @@ TERMS = 256  # cosines per axis: the kurtosis of the process is 3 - 3/(2 TERMS)
 
 def deviation(name: str, value: ArrayLike) -> np.ndarray:
     """Standard deviations (3,) from one number or one per axis; ValueError for a negative one."""
-    if validation.ndim(name, value) == 0:
-        value = np.full(3, validation.number(name, value))
-    out = validation.array(name, value, np.float64, (3,))
+    out = validation.each(name, value, 3)
     if (out < 0).any():
         raise ValueError(f"{name} is {out.tolist()}; a standard deviation is not negative")
     return out

@@ -74,9 +74,7 @@ def sinusoidal(
     validation.instance("track", track, Trajectory)
     size = validation.array("amplitude", amplitude, np.float64, (3,))
     rate = 2 * np.pi * validation.number("frequency", frequency, above=0)
-    if validation.ndim("phase", phase) == 0:
-        phase = np.full(3, validation.number("phase", phase))
-    phase = validation.array("phase", phase, np.float64, (3,))
+    phase = validation.each("phase", phase, 3)
     with np.errstate(over="ignore", invalid="ignore"):  # positions that are not finite are refused by their name
         angle = rate * track.known_times[:, None] + phase
         return _move(track, size * np.sin(angle), size * rate * np.cos(angle), frame)

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from ..base import counter_rng
 from ..base.constants import SPEED_OF_LIGHT
 from ..base.types import LazyRows
-from ..base.validation import array, count, direction, instance, ndim, number
+from ..base.validation import array, count, direction, each, instance, number
 from ..model.image_grid import ImageGrid
 from ..model.lazy_rows import RowsOnDemand
 from ..model.phase_history import PhaseHistory
@@ -62,10 +62,10 @@ def add_noise(
         ratio = number("nesz", nesz, above=0) if nesz is not None else _power(nesz_db)
         level: ArrayLike = ratio * _cells(raw, grid, cell_area) / float((_filtered(raw) ** 2).mean())
     elif variance is not None:
-        level = number("variance", variance) if ndim("variance", variance) == 0 else variance
+        level = each("variance", variance, raw.n_rows)
     else:
         level = noise_variance(raw, _kelvin(radar) if temperature is None else temperature)
-    level = array("variance", np.full(raw.n_rows, level) if np.ndim(level) == 0 else level, np.float64, (raw.n_rows,))
+    level = each("variance", level, raw.n_rows)
     if (level < 0).any():
         raise ValueError(f"variance[{int(np.argmin(level))}] is {level.min():g}; it cannot be negative")
     shape = _filtered(raw) if raw.compressed else np.ones(raw.n_samples)
@@ -104,9 +104,8 @@ def complex_gaussian(rows: np.ndarray, n_samples: int, seed: int) -> np.ndarray:
         state = counter_rng.mix(
             counter_rng.mix(start ^ rows.astype(np.uint64))[:, None] ^ np.arange(n_samples, dtype=np.uint64)
         )
-        first, second = counter_rng.mix(state), counter_rng.mix(state + np.uint64(counter_rng.GOLDEN))
-    radius = np.sqrt(-np.log((first >> np.uint64(11)).astype(np.float64) * 2.0**-53 + 2.0**-54))
-    return np.asarray(radius * np.exp(2j * np.pi * ((second >> np.uint64(11)).astype(np.float64) * 2.0**-53)))
+    power, cycles = counter_rng.polar(state)
+    return np.asarray(np.sqrt(power) * np.exp(2j * np.pi * cycles))
 
 
 def _kelvin(radar: Radar | None) -> float:

@@ -90,7 +90,7 @@ def ground(edge: float, random: np.random.Generator) -> Scene:
     bare = Scene.from_heights(axis, axis, relief(x, y), material=ROUGH)
     x, y, _ = np.moveaxis(bare.triangles.mean(axis=1), -1, 0)
     level = GRASS * (1 + 0.35 * patches(x, y, random))
-    level[y < relief_edge(x)] *= 1.7  # a field of taller growth
+    level[y < -12.5 - 0.3 * x] *= 1.7  # a field of taller growth, at the bottom of the picture
     across = np.abs(taxiway(x, y))
     level[across < 3.0] = ASPHALT
     level[across < 0.18] = PAINT
@@ -103,11 +103,6 @@ def apron() -> Scene:
 
     slab = shapes.plate(APRON_SIZE, material=replace(SLIGHTLY_ROUGH, reflectivity=CONCRETE))
     return slab.moved((*APRON, APRON_HEIGHT))
-
-
-def relief_edge(x: np.ndarray) -> np.ndarray:
-    """Upper edge of the field at the bottom of the picture, y in m."""
-    return -12.5 - 0.3 * x
 
 
 def patches(x: np.ndarray, y: np.ndarray, random: np.random.Generator) -> np.ndarray:

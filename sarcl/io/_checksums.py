@@ -55,17 +55,12 @@ class Checksums:
     blocks: list[int] = field(default_factory=list)
 
 
-def rows_per_block(shape: tuple[int, ...], dtype: DTypeLike) -> int:
-    """Rows of a block, so that it has about BLOCK_BYTES."""
-    return max(1, BLOCK_BYTES // max(1, int(np.prod(shape[1:], dtype=np.int64)) * np.dtype(dtype).itemsize))
-
-
 class RunningSums:
     """CRCs of the blocks of rows that are being written, without reading them again where rows come in order."""
 
     def __init__(self, shape: tuple[int, ...], dtype: DTypeLike) -> None:
         self.shape, self.dtype = shape, np.dtype(dtype)
-        self.step = rows_per_block(shape, dtype)
+        self.step = max(1, BLOCK_BYTES // max(1, int(np.prod(shape[1:], dtype=np.int64)) * self.dtype.itemsize))
         n = -(-shape[0] // self.step)
         self.sums = np.zeros(n, np.uint32)
         self._rows = np.zeros(n, np.int64)  # of each block, those that its CRC covers; -1: written in another order

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import zipfile
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
@@ -22,12 +21,6 @@ def open_document(data: bytes) -> collada.Collada:
     import collada
 
     return collada.Collada(io.BytesIO(data), ignore=[collada.common.DaeError])
-
-
-def check_kind(data: bytes, what: str) -> None:
-    """ValueError for a zip file under the name of a COLLADA file."""
-    if zipfile.is_zipfile(io.BytesIO(data)):
-        raise ValueError(f"{what} is a zip file, wanted XML: give it the name .zae")
 
 
 def check(document: collada.Collada, what: str) -> None:

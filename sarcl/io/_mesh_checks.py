@@ -30,12 +30,6 @@ def declared_faces(data: bytes, kind: str, what: str) -> int | None:
     return None
 
 
-def check_held(declared: int | None, held: int, what: str) -> None:
-    """ValueError where a file holds fewer faces than it declares; polygons count as several."""
-    if declared is not None and held < declared:
-        raise ValueError(f"{what} declares {declared} faces and holds {held}: {TAKE}")
-
-
 def check_indices(vertices: np.ndarray, faces: np.ndarray, what: str) -> None:
     """ValueError where vertices are not (n, 3), or a face names a vertex that there is not."""
     if vertices.ndim != 2 or vertices.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] != 3:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -130,8 +131,8 @@ def _scene(
         data = _mesh_text.of_obj(data, what) or data
     elif kind in (".glb", ".gltf"):
         _gltf_checks.check(data, what)
-    elif kind == ".dae":
-        _collada_checks.check_kind(data, what)
+    elif kind == ".dae" and zipfile.is_zipfile(io.BytesIO(data)):
+        raise ValueError(f"{what} is a zip file, wanted XML: give it the name .zae")
     try:
         collada = _collada_checks.open_document(data) if kind == ".dae" else None
         # process=False: merging and reordering corners is not needed and hides what the file holds
@@ -154,7 +155,8 @@ def _scene(
     if collada is not None:
         _collada_checks.check(collada, what)
     n_faces = sum(len(one.faces) for one in scene.geometry.values() if isinstance(one, trimesh.Trimesh))
-    _mesh_checks.check_held(declared, n_faces, what)
+    if declared is not None and n_faces < declared:  # polygons count as several
+        raise ValueError(f"{what} declares {declared} faces and holds {n_faces}: {_mesh_checks.TAKE}")
     return scene
 
 

@@ -51,12 +51,11 @@ def cells(positions: np.ndarray) -> np.ndarray:
         raise ValueError("every cell of the grid is empty (NaN, or not valid); give at least one position")
     bad = ~(np.abs(positions) < FARTHEST) & ~empty[..., None]
     if bad.any():
-        index = np.unravel_index(int(np.argmax(bad)), bad.shape)
-        shown = ", ".join(str(int(i)) for i in index)
+        index, place = validation.first(bad)
         if np.isfinite(positions[index]):
-            raise ValueError(f"positions[{shown}] is {positions[index]:g} m, where distances overflow; give metres")
+            raise ValueError(f"positions{place} is {positions[index]:g} m, where distances overflow; give metres")
         raise ValueError(
-            f"positions[{shown}] is {positions[index]}; give finite positions, and NaN in "
+            f"positions{place} is {positions[index]}; give finite positions, and NaN in "
             "all three coordinates of a cell that is empty"
         )
     return validation.sealed(positions)

@@ -26,10 +26,9 @@ def places(positions: ArrayLike) -> NDArray[np.float64]:
     validation.finite("positions", x)
     height = wgs84.geodetic(x)[2]
     if (height < DEEPEST).any():
-        index = np.unravel_index(int(np.argmin(height)), height.shape)
-        shown = f"[{', '.join(str(int(i)) for i in index)}]" if index else ""
+        index, place = validation.first(height == height.min())
         raise ValueError(
-            f"positions{shown} is {-height[index]:.4g} m under the ellipsoid; wanted Earth-fixed positions in m "
+            f"positions{place} is {-height[index]:.4g} m under the ellipsoid; wanted Earth-fixed positions in m "
             "(local ones: see sarcl.wgs84.ecef and local_axes)"
         )
     return x

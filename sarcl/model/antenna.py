@@ -157,8 +157,7 @@ class Antenna:
         taper  illumination at the edges, one or per axis, of a raised cosine on a pedestal: 1 uniform, 0.08 Hamming's,
                0 Hann's
         """
-        if validation.ndim("antenna taper", taper) == 0:
-            taper = np.full(2, validation.number("antenna taper", taper))
+        taper = validation.each("antenna taper", taper, 2)
         return cls(kind="aperture", size=size, taper=taper, gain_db=gain_db, two_way=two_way, mount=mount)
 
     @classmethod
@@ -219,9 +218,7 @@ class Antenna:
         """Complex amplitude gain (...) at directions in antenna axes (..., 3), of any length, at `frequency` Hz."""
         from .antenna_pattern import pattern_gain
 
-        directions = validation.values("directions", directions)
-        if directions.ndim == 0 or directions.shape[-1] != 3:
-            raise ValueError(f"directions has shape {directions.shape}, wanted (..., 3)")
+        directions = validation.vectors("directions", directions)
         return pattern_gain(self, directions, validation.number("frequency", frequency, above=0))
 
     def ratio(self, frequency: float | np.ndarray) -> float | np.ndarray:
@@ -298,9 +295,7 @@ def pair_of(antenna: object, bistatic: bool) -> tuple[Antenna, Antenna | None]:
 
 
 def _pair(name: str, value: object) -> np.ndarray:
-    if validation.ndim(name, value) == 0:
-        value = np.full(2, validation.number(name, value))
-    numbers = validation.array(name, value, np.float64, (2,))
+    numbers = validation.each(name, value, 2)
     if not (numbers > 0).all():
         raise ValueError(f"{name} is {numbers.tolist()}; both must be greater than 0")
     return numbers

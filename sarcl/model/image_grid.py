@@ -367,10 +367,7 @@ class ImageGrid:
         if self.times is not None and self.listed is not None:
             return listed_surface.index(self.listed, np.asarray(position))
         plane = self._plane("index")
-        x = validation.values("position", position)
-        if x.ndim == 0 or x.shape[-1] != 3:
-            raise ValueError(f"position has shape {x.shape}, wanted (..., 3)")
-        offset = x - plane.center
+        offset = validation.vectors("position", position) - plane.center
         with np.errstate(over="ignore", invalid="ignore"):  # positions that are infinite have no index: NaN
             row = offset @ plane.y_axis / plane.spacing[0] + self.shape[0] // 2
             return np.stack([row, offset @ plane.x_axis / plane.spacing[1] + self._middle], axis=-1)

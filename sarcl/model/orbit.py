@@ -327,10 +327,9 @@ class Orbit:
         start, stop = self.span
         outside = (times < start - ROUNDING) | (times > stop + ROUNDING)
         if outside.any():
-            index = np.unravel_index(int(np.argmax(outside)), times.shape)
-            shown = f"[{', '.join(str(int(i)) for i in index)}]" if index else ""
+            index, place = validation.first(outside)
             raise ValueError(
-                f"t{shown} = {times[index]:.9g} s is outside the orbit, which reaches from {start:.9g} to {stop:.9g} s "
+                f"t{place} = {times[index]:.9g} s is outside the orbit, which reaches from {start:.9g} to {stop:.9g} s "
                 f"after {'its epoch' if self.epoch is None else self.epoch}; give times within it"
             )
         return np.asarray(np.clip(times, start, stop))

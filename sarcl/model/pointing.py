@@ -75,12 +75,7 @@ def steered(track: Trajectory, azimuth: ArrayLike, elevation: ArrayLike = 0.0) -
     """
     validation.instance("track", track, Trajectory)
     axes = _attitude(track)
-    a, e = (
-        np.full(len(track), validation.number(n, v))
-        if validation.ndim(n, v) == 0
-        else validation.array(n, v, np.float64, (len(track),))
-        for n, v in (("azimuth", azimuth), ("elevation", elevation))
-    )
+    a, e = (validation.each(n, v, len(track)) for n, v in (("azimuth", azimuth), ("elevation", elevation)))
     zero = np.zeros(len(track))
     ahead = [np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)]
     side = [-np.sin(a), np.cos(a), zero]

@@ -4,7 +4,7 @@ For other folders:
 
     cost_model              measured costs by which plans are compared
     device_profiles         range profiles made on a device, and samples from profiles that were spread there
-    double_double           double-double arithmetic: sums, products and quotients with their rounding errors
+    double_double           double-double arithmetic: products and quotients with their rounding errors
     error_bounds            error bounds of the kernels
     interpolation           interpolation kernels for range profiles
     interpolator_choice     the cheapest interpolation kernel that meets an error

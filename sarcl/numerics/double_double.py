@@ -1,4 +1,4 @@
-"""Double-double arithmetic: sums, products and quotients of float64 with their rounding errors."""
+"""Double-double arithmetic: products and quotients of float64 with their rounding errors."""
 
 from __future__ import annotations
 
@@ -6,14 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from ..base.float_pairs import exact_sum
+
 Pair = tuple[np.ndarray, np.ndarray]  # an unevaluated sum hi + lo, about 106 bits
-
-
-def exact_sum(a: Any, b: Any) -> Pair:
-    """a + b exactly (Knuth 1969)."""
-    s = a + b
-    t = s - a
-    return s, (a - (s - t)) + (b - t)
 
 
 def exact_product(a: Any, b: Any) -> Pair:

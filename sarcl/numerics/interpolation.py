@@ -83,9 +83,13 @@ def deconvolved(taps: int, oversample: float, terms: int, dtype: DTypeLike = np.
     divided by the transform of the polynomials themselves, so that the error of their fit is that of its aliases alone.
     """
     table = HAT if taps == 2 else _kaiser_bessel(taps, oversample, terms)
-    table = table.astype(dtype)
+    return _of_table(table.astype(dtype), oversample)
+
+
+def _of_table(table: np.ndarray, oversample: float) -> Interpolator:
+    """The interpolation kernel of a table, whose transform spectra are divided by."""
     nu = np.linspace(0, 0.5 / oversample, 33)
-    return Interpolator(taps, oversample, table, _largest_error(table, nu, _transform(table, nu)))
+    return Interpolator(2 * len(table), oversample, table, _largest_error(table, nu, _transform(table, nu)))
 
 
 @functools.lru_cache(maxsize=256)
@@ -112,9 +116,7 @@ def fitted(taps: int, oversample: float) -> Interpolator:
             waves = 2 * (turns / correction[:, None])[:, :, None] * parts[:, None, None, :]
             found = np.linalg.lstsq(waves.reshape(wanted.size, -1), wanted.ravel(), rcond=None)[0]
             table[:, i] = found.reshape(taps // 2, terms)
-    table = table.astype(np.float32)
-    nu = np.linspace(0, 0.5 / oversample, 33)
-    return Interpolator(taps, oversample, table, _largest_error(table, nu, _transform(table, nu)))
+    return _of_table(table.astype(np.float32), oversample)
 
 
 def lower_bound(taps: int, oversample: float) -> float:

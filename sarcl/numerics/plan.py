@@ -11,6 +11,7 @@ import numpy as np
 
 from ..base.constants import SPEED_OF_LIGHT
 from ..base.errors import ToleranceUnreachable
+from ..base.text import shown
 from ..base.tolerances import rounded_up
 from . import cost_model, error_bounds, interpolator_choice
 from .interpolation import Interpolator
@@ -216,6 +217,5 @@ def skips(skip: object, known: tuple[str, ...]) -> set[str]:
         return set(known) if skip else set()
     names: list[Any] = list(skip) if isinstance(skip, (list, tuple, set, frozenset)) else [None]
     if not all(isinstance(name, str) and name in known for name in names):
-        shown = " ".join(repr(skip).split())
-        raise ValueError(f"skip is {shown:.60}; give True, False or a set of {', '.join(map(repr, known))}")
+        raise ValueError(f"skip is {shown(skip)}; give True, False or a set of {', '.join(map(repr, known))}")
     return set(names)

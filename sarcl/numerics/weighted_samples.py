@@ -22,12 +22,6 @@ FAINT = 1e-25  # largest modulus of weighted samples below which the host looks 
 PARTS = 32  # sums per row of `energy`, as in kernels/weighted_samples.cl
 
 
-def largest_part(samples: np.ndarray) -> float:
-    """The largest modulus of real and imaginary parts, which no modulus of a sample exceeds by more than sqrt(2)."""
-    parts = np.ascontiguousarray(samples).view(samples.real.dtype)
-    return max(float(parts.max()), -float(parts.min()))
-
-
 def bound_of_held(
     device: Device, samples: np.ndarray, weights: tuple[float, float], n: int, dtype: type[np.complexfloating]
 ) -> float | None:
@@ -43,7 +37,9 @@ def bound_of_held(
         return None
     if not all(w == 0 or 1 / WEIGHTS <= w <= WEIGHTS for w in weights):
         return None
-    bound = 1.5 * largest_part(samples) * weights[0] * weights[1]
+    parts = np.ascontiguousarray(samples).view(samples.real.dtype)
+    # no modulus exceeds the largest of real and imaginary parts by more than sqrt(2)
+    bound = 1.5 * max(float(parts.max()), -float(parts.min())) * weights[0] * weights[1]
     return bound if bound * n <= LARGEST[dtype] / SPARE else None
 
 

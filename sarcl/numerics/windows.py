@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base import validation
+from ..base.text import shown
 
 # of one direction: a name, (name, parameters) or an array; or a pair of these, or None, for range and cross-range
 WindowName = Literal[
@@ -53,11 +54,11 @@ def weights(window: Window | None, n: int) -> np.ndarray:
         made = _named(*_name(window), n)
     if not np.isfinite(made).all():
         raise ValueError(
-            f"window {_shown(window)} of {n} cells has weights that are not finite; its parameters are too large or 0"
+            f"window {shown(window)} of {n} cells has weights that are not finite; its parameters are too large or 0"
         )
     if (made < 0).any() or not made.any():
         raise ValueError(
-            f"window {_shown(window)} has weights of {made.min():g} to {made.max():g}; a weight is not "
+            f"window {shown(window)} has weights of {made.min():g} to {made.max():g}; a weight is not "
             "below zero, and not all are zero"
         )
     return made
@@ -75,7 +76,7 @@ def table(window: Window | None) -> np.ndarray:
     name, _ = _name(window)
     if name in OF_CELLS:
         raise ValueError(
-            f"window {_shown(window)} depends on the number of rows, and with a beam each pixel is seen by another "
+            f"window {shown(window)} depends on the number of rows, and with a beam each pixel is seen by another "
             "number of them; give an array of weights, which is stretched over the aperture of each pixel"
         )
     return weights(window, TABLE)
@@ -149,17 +150,13 @@ def _words(window: object) -> str:
     return " ".join([name, *(f"{p:g}" if np.ndim(p) == 0 else "array" for p in parameters)])
 
 
-def _shown(window: object) -> str:
-    return f"{' '.join(repr(window).split()):.60}"
-
-
 def _name(window: object) -> tuple[str, tuple[Any, ...]]:
     """Checked (name, parameters) of a window that is no array."""
     if window is None:
         return "none", ()
     name, *rest = tuple(window) if isinstance(window, (list, tuple)) and window else (window,)
     if not isinstance(name, str):
-        raise ValueError(f"window is {_shown(window)}; known are {KNOWN}")
+        raise ValueError(f"window is {shown(window)}; known are {KNOWN}")
     if name == "taylor" and len(rest) in (0, 2):
         level, nbar = rest or (30.0, 4)
         level = _bounded("taylor sidelobe_db", validation.number("taylor sidelobe_db", level, above=0))
@@ -169,12 +166,12 @@ def _name(window: object) -> tuple[str, tuple[Any, ...]]:
     from scipy.signal import windows
 
     if name in ("taylor", "hamming") or name not in windows.__all__ or name == "get_window":
-        raise ValueError(f"window is {_shown(window)}; known are {KNOWN}")
+        raise ValueError(f"window is {shown(window)}; known are {KNOWN}")
     wanted = [p for p in inspect.signature(getattr(windows, name)).parameters.values() if p.name in PARAMETERS]
     least = sum(p.default is inspect.Parameter.empty for p in wanted)
     if not least <= len(rest) <= len(wanted):
         names = ", ".join(p.name for p in wanted) or "no parameters"
-        raise ValueError(f"window is {_shown(window)}; {name!r} takes {names}")
+        raise ValueError(f"window is {shown(window)}; {name!r} takes {names}")
     for p, value in zip(wanted, rest, strict=False):
         if p.name == "a":
             validation.array("general_cosine a", value, np.float64, ("n",))

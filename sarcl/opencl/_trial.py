@@ -169,20 +169,13 @@ def wanted(x: np.ndarray, antenna: np.ndarray) -> list[np.ndarray]:
     vector = at[:, None] - points
     distance, length = np.sqrt((vector**2).sum(axis=0)), np.sqrt((at**2).sum())
     return [
-        *_exact_sum(high, other), product, (high.astype(np.float64) * other - product).astype(np.float32),
+        *float_pairs.exact_sum(high, other), product, (high.astype(np.float64) * other - product).astype(np.float32),
         a + b, a * b, a / b, np.sqrt(a),
         whole.astype(np.int64).astype(np.int32), a - whole, np.sin(angle), np.cos(angle),
         ((points**2).sum(axis=0) - 2 * at @ points) / (distance + length), distance, vector[1],
         np.full(N, np.arange(1, len(GIVEN) + 1) @ GIVEN, np.float32),
-        *_exact_sum(product, other),
+        *float_pairs.exact_sum(product, other),
     ]  # fmt: skip
-
-
-def _exact_sum(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """float32 a + b, and its rounding error."""
-    total = a + b
-    back = total - a
-    return total, (a - (total - back)) + (b - back)
 
 
 def _wrong_numbers(queue: pyopencl.CommandQueue, kernel: pyopencl.Kernel, lanes: int) -> str:

@@ -6,6 +6,7 @@ import numbers
 import os
 from typing import Any
 
+from ..base.text import shown
 from . import _cache_folder, _linker
 from .device import Device, DeviceChoice, once
 from .device_list import DeviceInfo, devices, distinct, listed, tried
@@ -27,9 +28,9 @@ def open_device(choice: DeviceChoice | None = None) -> Device:
     if isinstance(choice, Device):
         return choice
     if isinstance(choice, bool) or not isinstance(choice, (str, numbers.Integral, type(None))):
-        shown = " ".join(repr(choice).split())
         raise TypeError(
-            f"device is {shown:.60}; give an index, 'cpu', 'gpu', a part of the name of one of sarcl.devices(), or None"
+            f"device is {shown(choice)}; give an index, 'cpu', 'gpu', a part of the name of one of "
+            "sarcl.devices(), or None"
         )
     source = "device"
     if choice is None:

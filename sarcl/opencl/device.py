@@ -56,16 +56,16 @@ class Device:
         import pyopencl
 
         self.info, self.limits = info, limits
-        self._raw = raw
+        self._raw, self._cl = raw, pyopencl
         if info.kind == "cpu" and threads() < info.units and os.environ.get("SARCL_THREADS"):
             try:
-                raw = raw.create_sub_devices([pyopencl.device_partition_property.BY_COUNTS, threads()])[0]
-            except pyopencl.Error as exc:
+                raw = raw.create_sub_devices([self._cl.device_partition_property.BY_COUNTS, threads()])[0]
+            except self._cl.Error as exc:
                 raise RuntimeError(
                     f"{info.name} cannot be limited to SARCL_THREADS={threads()} ({first_line(exc)}); unset it"
                 ) from None
         with explained(self.info, "a context"):
-            self.context = pyopencl.Context([raw])
+            self.context = self._cl.Context([raw])
             self.queue = self._timed_queue(raw)
         self._kernels: dict[tuple[Any, ...], dict[str, Any]] = {}
         self._counts: dict[Any, int] = {}  # launches of each kernel
@@ -75,13 +75,11 @@ class Device:
 
     def _timed_queue(self, raw: pyopencl.Device) -> pyopencl.CommandQueue:
         """The queue of commands; on devices other than CPUs with a clock for launches, where the driver has one."""
-        import pyopencl
-
         if not self.is_cpu:
-            with suppress(pyopencl.Error):
-                clock = pyopencl.command_queue_properties.PROFILING_ENABLE
-                return pyopencl.CommandQueue(self.context, raw, properties=clock)
-        return pyopencl.CommandQueue(self.context, raw)
+            with suppress(self._cl.Error):
+                clock = self._cl.command_queue_properties.PROFILING_ENABLE
+                return self._cl.CommandQueue(self.context, raw, properties=clock)
+        return self._cl.CommandQueue(self.context, raw)
 
     @property
     def is_cpu(self) -> bool:
@@ -107,15 +105,13 @@ class Device:
             return self._kernels[key][name]
 
     def _build(self, file: str, macros: dict[str, int]) -> dict[str, Any]:
-        import pyopencl
-
         text = source(file)
         # a macro that the code does not name would only make the driver's cache hold the same binary twice
         options = [f"-D{k}={int(v)}" for k, v in sorted(macros.items()) if k in names_in(text)]
         try:
             with quiet():
                 program = build(self.context, text, options)
-        except pyopencl.Error as exc:
+        except self._cl.Error as exc:
             raise RuntimeError(
                 f"kernels/{file} does not build on {self.info.name!r} ({self.info.driver}) with {' '.join(options)}: "
                 f"{str(exc).strip()[:2000]}\nChoose another device (sarcl devices) and report this message"
@@ -129,15 +125,13 @@ class Device:
 
         On CPUs it shares the array's memory, and the device keeps the array until the kernels that read it have ended.
         """
-        import pyopencl
-
         array = np.ascontiguousarray(array)
         self._check_size(array.nbytes)
         with explained(self.info, "a buffer", array.nbytes):
             if self.is_cpu:
                 return self._arrays.shared(self.context, array)
-            memory = pyopencl.mem_flags
-            return pyopencl.Buffer(self.context, memory.READ_ONLY | memory.COPY_HOST_PTR, hostbuf=array)
+            memory = self._cl.mem_flags
+            return self._cl.Buffer(self.context, memory.READ_ONLY | memory.COPY_HOST_PTR, hostbuf=array)
 
     def output(self, array: np.ndarray) -> Buffer:
         """A buffer of the size of a contiguous `array`, for `download` to it: on CPUs it shares the array's memory."""
@@ -155,46 +149,36 @@ class Device:
 
     def zeros(self, nbytes: int) -> Buffer:
         """A buffer of `nbytes` zero bytes."""
-        import pyopencl
-
         buffer = self.empty(nbytes)
         with explained(self.info, "a buffer", nbytes):
             # some drivers fill with one byte at a time; the size must be a multiple of the pattern's
             pattern = np.zeros(next(n for n in (16, 4, 1) if nbytes % n == 0), np.uint8)
-            pyopencl.enqueue_fill_buffer(self.queue, buffer, pattern, 0, nbytes)
+            self._cl.enqueue_fill_buffer(self.queue, buffer, pattern, 0, nbytes)
         return buffer
 
     def empty(self, nbytes: int) -> Buffer:
         """A buffer of `nbytes` bytes, not initialised."""
-        import pyopencl
-
         self._check_size(nbytes)
         with explained(self.info, "a buffer", nbytes):
-            return pyopencl.Buffer(self.context, pyopencl.mem_flags.READ_WRITE, nbytes)
+            return self._cl.Buffer(self.context, self._cl.mem_flags.READ_WRITE, nbytes)
 
     def write(self, buffer: Any, values: np.ndarray) -> None:
         """Copy `values` into a buffer, from its beginning on."""
-        import pyopencl
-
         with explained(self.info, "a copy", values.nbytes):
-            pyopencl.enqueue_copy(self.queue, buffer, np.ascontiguousarray(values))
+            self._cl.enqueue_copy(self.queue, buffer, np.ascontiguousarray(values))
 
     def another_queue(self) -> pyopencl.CommandQueue:
         """A queue of commands beside the device's own, for `write_behind`."""
-        import pyopencl
-
         with explained(self.info, "a queue"):
-            return pyopencl.CommandQueue(self.context, self.queue.device)
+            return self._cl.CommandQueue(self.context, self.queue.device)
 
     def page_locked(self, queue: pyopencl.CommandQueue, nbytes: int) -> np.ndarray:
         """Memory of the host, uint8 (nbytes,), from which the driver copies without the processor's help."""
-        import pyopencl
-
-        memory = pyopencl.mem_flags
+        memory = self._cl.mem_flags
         with explained(self.info, "page-locked memory", nbytes):
-            held = pyopencl.Buffer(self.context, memory.READ_WRITE | memory.ALLOC_HOST_PTR, nbytes)
-            write, byte = pyopencl.map_flags.WRITE, np.dtype(np.uint8)
-            return np.asarray(pyopencl.enqueue_map_buffer(queue, held, write, 0, (nbytes,), byte)[0])
+            held = self._cl.Buffer(self.context, memory.READ_WRITE | memory.ALLOC_HOST_PTR, nbytes)
+            write, byte = self._cl.map_flags.WRITE, np.dtype(np.uint8)
+            return np.asarray(self._cl.enqueue_map_buffer(queue, held, write, 0, (nbytes,), byte)[0])
 
     def write_behind(self, queue: pyopencl.CommandQueue, buffer: pyopencl.Buffer, values: np.ndarray) -> pyopencl.Event:
         """Copy `values` into a buffer on a queue of `another_queue`, while the device's own queue goes on.
@@ -202,20 +186,16 @@ class Device:
         Returns at once an event that ends with the copy. What is enqueued on the device after this call waits for it.
         The event keeps `values`; an event that is dropped is waited for.
         """
-        import pyopencl
-
         with explained(self.info, "a copy", values.nbytes):
-            copied = pyopencl.enqueue_copy(queue, buffer, values, is_blocking=False)
+            copied = self._cl.enqueue_copy(queue, buffer, values, is_blocking=False)
             queue.flush()
-            pyopencl.enqueue_barrier(self.queue, wait_for=[copied])
+            self._cl.enqueue_barrier(self.queue, wait_for=[copied])
             return copied
 
     def mark(self) -> pyopencl.Event:
         """An event that ends with everything enqueued so far, which begins to run now."""
-        import pyopencl
-
         with explained(self.info, "running"):
-            event = pyopencl.enqueue_marker(self.queue)
+            event = self._cl.enqueue_marker(self.queue)
             self.queue.flush()
             return event
 
@@ -226,16 +206,14 @@ class Device:
 
     def download(self, buffer: Any, out: np.ndarray, offset: int = 0) -> np.ndarray:
         """Copy a buffer, from byte `offset` on, into `out` and return it."""
-        import pyopencl
-
         enqueued = self._arrays.enqueued
         with explained(self.info, "a copy", out.nbytes):
             if getattr(buffer, "array", None) is out:  # of `output`: the driver puts the contents where they belong
-                read, byte = pyopencl.map_flags.READ, np.dtype(np.uint8)
-                mapped, _ = pyopencl.enqueue_map_buffer(self.queue, buffer, read, offset, (out.nbytes,), byte)
+                read, byte = self._cl.map_flags.READ, np.dtype(np.uint8)
+                mapped, _ = self._cl.enqueue_map_buffer(self.queue, buffer, read, offset, (out.nbytes,), byte)
                 mapped.base.release()
             else:
-                pyopencl.enqueue_copy(self.queue, out, buffer, src_offset=offset)
+                self._cl.enqueue_copy(self.queue, out, buffer, src_offset=offset)
         self._ended(enqueued)
         return out
 
@@ -285,9 +263,7 @@ class Device:
 
     def max_group(self, kernel: pyopencl.Kernel) -> int:
         """Most work-items of `kernel` in one group."""
-        import pyopencl
-
-        return int(kernel.get_work_group_info(pyopencl.kernel_work_group_info.WORK_GROUP_SIZE, self.queue.device))
+        return int(kernel.get_work_group_info(self._cl.kernel_work_group_info.WORK_GROUP_SIZE, self.queue.device))
 
     def shares(self, nbytes: int, items: int) -> bool:
         """Whether kernels in which so many work-items share so many bytes of local memory are the better ones.
@@ -295,12 +271,6 @@ class Device:
         Never on CPU devices: there a work-item keeps its sums in a cache.
         """
         return not self.is_cpu and self.info.local_memory >= nbytes and self.info.max_group >= items
-
-    def reikna_thread(self) -> Any:
-        """reikna's handle on this device's queue."""
-        from reikna.cluda import ocl_api
-
-        return ocl_api().Thread(self.queue)
 
     def _check_size(self, nbytes: int) -> None:
         if nbytes > self.info.max_alloc:

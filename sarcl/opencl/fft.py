@@ -135,11 +135,12 @@ def _reikna(device: Device, data: np.ndarray, inverse: bool) -> np.ndarray:
 
 @functools.lru_cache(maxsize=16)
 def _plan(device: Device, shape: tuple[int, ...], kind: str) -> tuple[Any, Any]:
+    from reikna.cluda import ocl_api
     from reikna.core import Type
     from reikna.fft import FFT
 
     # plans hold buffers that must go before the interpreter takes down what frees them
     atexit.register(_plan.cache_clear)
-    thread = device.reikna_thread()
+    thread = ocl_api().Thread(device.queue)
     with quiet():
         return thread, FFT(Type(np.dtype(kind), shape), axes=(1,)).compile(thread)

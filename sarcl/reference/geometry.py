@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base.float_pairs import exact_sum
+
 Real = np.ndarray | np.floating
 
 
@@ -16,7 +18,7 @@ def half_path(tx: np.ndarray, rx: np.ndarray, points: np.ndarray, reference_rang
     """
     x = points.astype(np.longdouble)
     b = np.longdouble(np.linalg.norm(points[0] - tx))
-    rest, low = _sum(2 * np.longdouble(reference_range), -b)
+    rest, low = exact_sum(2 * np.longdouble(reference_range), -b)
     return (_beyond(x, tx, b) + _beyond(x, rx, rest) - low) / 2
 
 
@@ -26,23 +28,16 @@ def _beyond(x: np.ndarray, end: np.ndarray, b: Real) -> np.ndarray:
     square, low = -square, -low
     length = np.zeros(len(x), np.longdouble)
     for axis in range(3):
-        d, lost = _sum(x[:, axis], -np.longdouble(end[axis]))
+        d, lost = exact_sum(x[:, axis], -np.longdouble(end[axis]))
         low = low + 2 * d * lost
         one, one_low = _square(d)
         length += one
-        square, lost = _sum(square, one)
+        square, lost = exact_sum(square, one)
         low = low + (lost + one_low)
     length = np.sqrt(length)
     if b <= 0:  # a reference range far from the path: the quotient gains nothing
         return np.asarray(length - b)
     return np.asarray((square + low) / np.where(length + b > 0, length + b, 1))
-
-
-def _sum(a: Real, b: Real) -> tuple[Real, Real]:
-    """a + b and its rounding error (Knuth)."""
-    total = a + b
-    part = total - a
-    return total, (a - (total - part)) + (b - part)
 
 
 def _square(a: Real) -> tuple[Real, Real]:

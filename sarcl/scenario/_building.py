@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from ..earth.place import Place
     from ..model.antenna import Antenna
     from ..model.image_grid import ImageGrid
-    from ..model.orbit import Orbit
     from ..model.trajectory import Trajectory
     from ..scene.scene import Scene
     from .scenario import Scenario
@@ -31,10 +30,6 @@ class Builder:
     """Makes the objects of a scenario; ValueError names file, line and table of what cannot be made."""
 
     scenario: Scenario
-
-    def orbit(self) -> Orbit:
-        """The Orbit."""
-        return self.one("orbit")
 
     def place(self) -> Place | None:
         """The Place that is the origin of local coordinates; None where there is none."""
@@ -51,7 +46,7 @@ class Builder:
                 )
             self._check_local(kind, "trajectory")
             return self._aimed(self.one("trajectory"), "pointing")
-        orbit, table = self.orbit(), dict(self.section("trajectory")["orbit"])
+        orbit, table = self.one("orbit"), dict(self.section("trajectory")["orbit"])
         place = self.place()
         if place is not None and not {"start", "center"} & set(table):
             with self.scenario.where.blame(("place",), {}):

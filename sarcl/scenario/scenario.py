@@ -127,7 +127,7 @@ class Scenario:
 
     def build_orbit(self) -> Orbit:
         """The Orbit."""
-        return Builder(self).orbit()
+        return Builder(self).one("orbit")
 
     def build_place(self) -> Place | None:
         """The Place that is the origin of local coordinates; None where there is none."""

@@ -16,6 +16,7 @@ from ...base import arguments
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.errors import NotApplicable
 from ...base.rows import spread_over
+from ...base.text import shown
 from ...base.vectors import unit
 from ...model.phase_history import PhaseHistory
 from ...opencl.device import DeviceChoice
@@ -54,8 +55,7 @@ def run(
 ) -> list[dict[str, Any]]:
     """Measurements of each case: plain numbers, ready for JSON."""
     if not isinstance(cases, Sequence) or not all(isinstance(case, Case) for case in cases):
-        shown = " ".join(repr(cases).split())
-        raise TypeError(f"cases is {shown:.60}; give a list of fda.Case")
+        raise TypeError(f"cases is {shown(cases)}; give a list of fda.Case")
     arguments.progress(progress)
     out = []
     for i, case in enumerate(cases):

@@ -9,10 +9,11 @@ import numpy as np
 
 from ...base import text
 from ...base.constants import SPEED_OF_LIGHT
+from ...base.float_pairs import exact_sum
 from ...base.stage_timer import Clock
 from ...blocks.bands import FlatArray
 from ...model.phase_history import PhaseHistory
-from ...numerics.double_double import exact_product, exact_sum, quotient
+from ...numerics.double_double import exact_product, quotient
 from ...numerics.pulse_geometry import PulseGeometry
 from ...opencl.device import Device
 from ...opencl.device_list import devices

@@ -46,19 +46,13 @@ def section(lab: Lab) -> Section:
 def _shapes(out: Section, curves: dict[str, dict[str, tuple[np.ndarray, np.ndarray]]]) -> None:
     """Largest difference of the responses from a sinc and a triangle, over main lobe and side lobes."""
     cell = SPEED_OF_LIGHT / (2 * BAND)
-    for name, law, wanted in (("LFM", "sinc", _sinc), ("tone", "triangular", _triangle)):
-        at, values = curves["range"][name]
-        off = float(np.abs(values / values.max() - wanted(at / cell)).max())
+    for name, law in (("LFM", "sinc"), ("tone", "triangular")):
+        places, values = curves["range"][name]
+        x = places / cell
+        wanted = np.abs(np.sinc(x)) if law == "sinc" else np.maximum(1 - np.abs(x), 0)
+        off = float(np.abs(values / values.max() - wanted).max())
         out.states("{name}: shape of the range response", off, off < 0.05, expected=law, name=name, law=law)
-    at, chirp = curves["cross-range"]["LFM"]
+    chirp = curves["cross-range"]["LFM"][1]
     tone = curves["cross-range"]["tone"][1]
     off = float(np.abs(chirp / chirp.max() - tone / tone.max()).max())
     out.states("cross-range responses of both", off, off < 0.05)
-
-
-def _sinc(x: np.ndarray) -> np.ndarray:
-    return np.abs(np.sinc(x))
-
-
-def _triangle(x: np.ndarray) -> np.ndarray:
-    return np.maximum(1 - np.abs(x), 0)

@@ -91,19 +91,16 @@ def compared(lab: Lab, name: str) -> Comparison:
         echoes.append(np.delete(made.read(0, made.n_rows), middle, axis=0))
     exact, own = echoes[0], raw.read(0, n)[rows]
     norm = np.linalg.norm(exact, axis=1)
+    total = float(np.linalg.norm(norm))
     positions = track.positions[rows]
     errors = [np.linalg.norm(made - exact, axis=1) for made in (echoes[1], own)]
     return Comparison(
         np.arctan2(positions[:, 1], np.hypot(positions[:, 0], positions[:, 2])),
         errors[0] / norm,
         errors[1] / norm,
-        (_root(errors[0]) / _root(norm), _root(errors[1]) / _root(norm)),
+        (float(np.linalg.norm(errors[0])) / total, float(np.linalg.norm(errors[1])) / total),
         (seconds[0] / len(pulses), seconds[1]),
     )
-
-
-def _root(values: np.ndarray) -> float:
-    return float(np.linalg.norm(values))
 
 
 def _db(error: np.ndarray) -> np.ndarray:

@@ -122,8 +122,3 @@ def recorded(record: Record, raw: PhaseHistory) -> PhaseHistory:
     peak = np.sqrt(DURATION * BANDWIDTH) * np.exp(0.25j * np.pi)  # as in `received`, and BANDWIDTH from_time takes
     samples = (history.read(0, history.n_rows) / peak).astype(np.complex64)
     return replace(history, samples=samples, waveform=CHIRP, compressed=False)
-
-
-def at_pulses(raw: PhaseHistory, samples: np.ndarray) -> PhaseHistory:
-    """The same geometry with other samples."""
-    return replace(raw, samples=samples, report=None)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
@@ -9,7 +11,6 @@ from ...imaging.backproject import backproject
 from ...reference.mie import conducting_sphere
 from ..paper import Section
 from ._lab import Lab, radius
-from ._radar import at_pulses
 
 ECHO_ERROR, PEAK_ERROR, PLACE_ERROR = 0.05, 0.2, 0.02  # share of the rms; dB; m
 OPTICS_ERROR = 0.03  # share of the rms: flat facets in place of the sphere, and 1e-2 of tolerance
@@ -47,7 +48,8 @@ def section(lab: Lab) -> Section:
     out.states("sphere: VH over HH", level, level < -40)
     grid = lab.radar.grid((0.6, radius(lab.scene("sphere"))), SPACING)
     cuts, peaks = [], []
-    for name, data in (("full wave", raw), ("Mie's series", at_pulses(raw, np.tile(mie, (raw.n_rows, 1))))):
+    series = replace(raw, samples=np.tile(mie, (raw.n_rows, 1)), report=None)
+    for name, data in (("full wave", raw), ("Mie's series", series)):
         image = backproject(data, grid, tolerance=1e-3, check=False, device=lab.device)
         pixels = np.abs(np.asarray(image.data)) / image.gain
         cut = pixels[grid.shape[0] // 2]
