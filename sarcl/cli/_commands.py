@@ -31,7 +31,16 @@ def run(args: argparse.Namespace, outputs: Outputs) -> int:
     """Run the command in `args`; `outputs` gets what each output path is before the work."""
     logging.basicConfig(level=logging.INFO if args.verbose else logging.WARNING, format="sarcl: %(message)s")
     warnings.showwarning = _show_warning
-    commands = {command.__name__: command for command in (devices, demo, simulate, focus, measure, fda, papers, bench)}
+    commands = {
+        "devices": devices,
+        "demo": demo,
+        "simulate": simulate,
+        "focus": focus,
+        "measure": measure,
+        "fda": fda,
+        "papers": papers,
+        "bench": bench,
+    }
     with Job(outputs) as job:
         return commands[args.command](args, job)
 

@@ -231,6 +231,11 @@ class AntennaArray:
         return float(step[0]) if fits and np.ptp(step) <= 1e-12 * np.abs(step).max() else None
 
     @property
+    def centers(self) -> np.ndarray:
+        """Mean of the extreme offsets of each plan, Hz (n_plans,)."""
+        return np.asarray((self.offsets.min(axis=1) + self.offsets.max(axis=1)) / 2)
+
+    @property
     def center(self) -> float:
         """Mean of the extreme offsets over all plans, Hz."""
         return float((self.offsets.min() + self.offsets.max()) / 2)
@@ -243,7 +248,7 @@ class AntennaArray:
     @property
     def center_jump(self) -> float:
         """Largest difference of the centre frequency between two plans, Hz; it defocuses the sum of their pulses."""
-        return float(np.ptp((self.offsets.min(axis=1) + self.offsets.max(axis=1)) / 2))
+        return float(np.ptp(self.centers))
 
 
 def _size(name: str, n: object) -> int:
