@@ -80,9 +80,9 @@ class ImageInterpolator:
                 f"{self.image.grid.shape} ends before that about {index[0].round(1)}: focus a larger grid"
             )
         chip = self.baseband(low, high)
-        taken = first[:, :, None] + np.arange(self.taps)  # (n, 2, taps)
-        weight = _kernel(index[:, :, None] - taken, self.taps)
-        rows, columns = np.moveaxis(taken - low[:, None], 1, 0)
+        pixels = first[:, :, None] + np.arange(self.taps)  # (n, 2, taps)
+        weight = _kernel(index[:, :, None] - pixels, self.taps)
+        rows, columns = np.moveaxis(pixels - low[:, None], 1, 0)
         near = chip[rows[:, :, None], columns[:, None, :]]
         values = np.einsum("na,nb,nab->n", weight[:, 0], weight[:, 1], near)
         return values * self.carrier(position) * self._turned(index)

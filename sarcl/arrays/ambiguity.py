@@ -59,17 +59,17 @@ def ambiguity(
     if max_delay is not None:
         lags = lags[np.abs(lags) <= validation.number("max_delay", max_delay, least=0) * rate * (1 + 1e-12)]
     dopplers = fft.fftshift(fft.fftfreq(length, 1 / rate))
-    kept = np.ones(length, bool)
+    in_band = np.ones(length, bool)
     if max_doppler is not None:
-        kept = np.abs(dopplers) <= validation.number("max_doppler", max_doppler, least=0) * (1 + 1e-12)
-    need = 8.0 * len(lags) * int(kept.sum())
+        in_band = np.abs(dopplers) <= validation.number("max_doppler", max_doppler, least=0) * (1 + 1e-12)
+    need = 8.0 * len(lags) * int(in_band.sum())
     if need > MOST_BYTES:
         raise MemoryError(f"the ambiguity of {n} samples takes {size_text(need)}; give max_delay and max_doppler")
-    out = np.empty((len(lags), int(kept.sum())))
+    out = np.empty((len(lags), int(in_band.sum())))
     padded = np.concatenate([np.zeros(n - 1), s, np.zeros(n - 1)])
     late = np.lib.stride_tricks.sliding_window_view(padded, n)  # row n - 1 - lag is s(t - lag)
     for i in range(0, len(lags), ROWS):
         products = late[n - 1 - lags[i : i + ROWS]] * s.conj()
         spectra = fft.fftshift(fft.ifft(products, length, axis=1), axes=1) * length
-        out[i : i + ROWS] = np.abs(spectra[:, kept]) / energy
-    return Ambiguity(validation.sealed(lags / rate), validation.sealed(dopplers[kept]), validation.sealed(out))
+        out[i : i + ROWS] = np.abs(spectra[:, in_band]) / energy
+    return Ambiguity(validation.sealed(lags / rate), validation.sealed(dopplers[in_band]), validation.sealed(out))

@@ -35,20 +35,20 @@ def reduced(x: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
     """x, rad, reduced to [-pi, pi], and the number of whole cycles that are removed; |x| up to 6e6."""
     x = validation.values("angle", x)
     validation.finite("angle", x)
-    whole = np.rint(x / (2 * np.pi))
-    if whole.size and np.abs(whole).max() >= 2**20:
+    cycles = np.rint(x / (2 * np.pi))
+    if cycles.size and np.abs(cycles).max() >= 2**20:
         raise ValueError(f"an angle of {np.abs(x).max():g} rad is too large to be reduced; keep below 6e6")
-    return ((x - whole * _TWO_PI[0]) - whole * _TWO_PI[1]) - whole * _TWO_PI[2], whole
+    return ((x - cycles * _TWO_PI[0]) - cycles * _TWO_PI[1]) - cycles * _TWO_PI[2], cycles
 
 
 def dirichlet(x: ArrayLike, n: int) -> np.ndarray:
     """sin(n x/2)/sin(x/2), n where x is 0; x rad (...), |x| <= 6e6. The error is below 1e-12 n."""
     n = validation.count("n", n)
-    rest, whole = reduced(x)
+    rest, cycles = reduced(x)
     flat = np.abs(rest) < 1e-300  # half of a smaller number may underflow to 0
     half = np.where(flat, 1.0, rest / 2)
     ratio = np.where(flat, float(n), np.sin(n * half) / np.sin(half))
-    return np.asarray(np.where((whole % 2 != 0) & (n % 2 == 0), -ratio, ratio))
+    return np.asarray(np.where((cycles % 2 != 0) & (n % 2 == 0), -ratio, ratio))
 
 
 def geometric(x: ArrayLike, n: int) -> np.ndarray:

@@ -153,11 +153,11 @@ class _Field:
 
         outer, inner = (time_blocks, range_blocks) if along_times else (range_blocks, time_blocks)
         outer_table, inner_table = (time_table, path_table) if along_times else (path_table, time_table)
-        kept = inner_table(inner[0]) if len(inner) == 1 else None
+        only_table = inner_table(inner[0]) if len(inner) == 1 else None
         for lane_block in outer:
             lane = outer_table(lane_block)
             for row_block in inner:
-                sums = self._sum(lane, kept or inner_table(row_block), len(row_block))[:, : len(lane_block)]
+                sums = self._sum(lane, only_table or inner_table(row_block), len(row_block))[:, : len(lane_block)]
                 if along_times:
                     out[np.ix_(lane_block, row_block)] = sums.T
                 else:
@@ -180,14 +180,14 @@ class _Field:
 
     def _sum(self, lane: tuple[Any, int], row: tuple[Any, int], rows: int) -> np.ndarray:
         """Sums over the elements for the entries of two tables, complex (rows, lanes)."""
-        used = next(k for k in (1, 2, 4, ROWS) if k >= min(rows, ROWS))
+        n_rows = next(k for k in (1, 2, 4, ROWS) if k >= min(rows, ROWS))
         tiles = row[1] // ROWS
-        out = self.device.empty(self.item * tiles * used * lane[1])
+        out = self.device.empty(self.item * tiles * n_rows * lane[1])
         self.device.run(
-            self._kernel("add", used), (lane[1] // self.device.info.vector_width, tiles), self.group,
+            self._kernel("add", n_rows), (lane[1] // self.device.info.vector_width, tiles), self.group,
             lane[0], row[0], len(self.carriers), lane[1], out, steps=len(self.carriers),
         )  # fmt: skip
-        planes = self.device.download(out, np.empty((tiles * used, 2, lane[1]), self.real))
+        planes = self.device.download(out, np.empty((tiles * n_rows, 2, lane[1]), self.real))
         return np.asarray(planes[:rows, 0] + 1j * planes[:rows, 1])
 
     def _kernel(self, name: str, used: int = ROWS) -> Any:

@@ -122,15 +122,15 @@ def sampling(carriers: np.ndarray, waveform: Waveform, near: float, far: float, 
     period = 4 * max(abs(near), abs(far)) / SPEED_OF_LIGHT
     if not compressed:
         period += waveform.duration
-    low, high, apart = float(carriers.min()), float(carriers.max()), spacing(carriers)
-    own = waveform.bandwidth if apart is None or waveform.kind != "tone" else min(waveform.bandwidth, apart)
-    if apart is None:
+    low, high, gap = float(carriers.min()), float(carriers.max()), spacing(carriers)
+    own = waveform.bandwidth if gap is None or waveform.kind != "tone" else min(waveform.bandwidth, gap)
+    if gap is None:
         n = max(1, int(np.ceil(period * (high - low + own) * (1 - 1e-12))))
         step = (high - low + own) / n
         width = max(1, round(own / step))
         return Sampling(low - own / 2 + step / 2, step, n, n if high == low else width)
-    parts = max(1, int(np.ceil(period * apart * (1 - 1e-9))))
-    step = apart / (parts + 1 - parts % 2)  # odd: carriers lie on samples, and bands end between them
+    parts = max(1, int(np.ceil(period * gap * (1 - 1e-9))))
+    step = gap / (parts + 1 - parts % 2)  # odd: carriers lie on samples, and bands end between them
     width = max(1, int(np.ceil(own / step * (1 - 1e-9))))
     width += 1 - width % 2
     return Sampling(low - (width - 1) / 2 * step, step, round((high - low) / step) + width, width)
@@ -142,31 +142,31 @@ def cut_of(grid: Sampling, waveform: Waveform, carriers: np.ndarray, compressed:
 
     For tones shorter than 1/spacing: warn of it. Source: docs/theory/fda.md, "Tones between carriers".
     """
-    apart = spacing(carriers)
-    if waveform.kind != "tone" or apart is None:
+    gap = spacing(carriers)
+    if waveform.kind != "tone" or gap is None:
         return 0.0
     most = int(waveform.bandwidth / 2 / grid.step * (1 + 1e-9))
     spectrum = np.sinc(np.arange(-most, most + 1) * grid.step * waveform.duration) ** (2 if compressed else 1)
     power = spectrum**2
     own = np.abs(np.arange(-most, most + 1)) <= grid.width // 2
     cut = float(np.sqrt(power[~own].sum() / power.sum()))
-    if waveform.duration * apart < 1 - 1e-9 and cut > LEAST_CUT:
+    if waveform.duration * gap < 1 - 1e-9 and cut > LEAST_CUT:
         warn(
-            f"the pulse of {waveform.duration:.4g} s is shorter than 1/|df| = {1 / apart:.4g} s: each channel is "
+            f"the pulse of {waveform.duration:.4g} s is shorter than 1/|df| = {1 / gap:.4g} s: each channel is "
             f"sampled up to half-way to the next carriers, which leaves out {100 * cut:.2g} % of its spectrum's norm; "
-            f"take a pulse of {1 / apart:.4g} s, or carriers {1 / waveform.duration:.4g} Hz apart"
+            f"take a pulse of {1 / gap:.4g} s, or carriers {1 / waveform.duration:.4g} Hz apart"
         )
     return cut
 
 
 def warn_of(array: AntennaArray, waveform: Waveform, carriers: np.ndarray) -> None:
     """Warn where ranges are ambiguous with these channels, or images defocus."""
-    apart = spacing(carriers)
-    if apart is not None and waveform.duration * apart > 1 + 1e-9:
+    gap = spacing(carriers)
+    if gap is not None and waveform.duration * gap > 1 + 1e-9:
         warn(
-            f"the pulse of {waveform.duration:.4g} s is longer than 1/|df| = {1 / apart:.4g} s: the channels' sum "
-            f"peaks {waveform.duration * apart:.3g} times in it, so that ranges {SPEED_OF_LIGHT / (2 * apart):.4g} m "
-            f"apart are ambiguous; shorten the pulse to {1 / apart:.4g} s"
+            f"the pulse of {waveform.duration:.4g} s is longer than 1/|df| = {1 / gap:.4g} s: the channels' sum "
+            f"peaks {waveform.duration * gap:.3g} times in it, so that ranges {SPEED_OF_LIGHT / (2 * gap):.4g} m "
+            f"apart are ambiguous; shorten the pulse to {1 / gap:.4g} s"
         )
     jump = array.center_jump
     if jump:

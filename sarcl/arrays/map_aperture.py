@@ -171,28 +171,31 @@ def _elements(raw: PhaseHistory, array: AntennaArray, pulse: np.ndarray) -> np.n
     for number, offsets in enumerate(array.offsets):
         rows = plan == number
         carriers = raw.waveform.center + offsets
-        apart = spacing(carriers)
-        if apart is None or len(np.unique(carriers)) < array.n:
+        gap = spacing(carriers)
+        if gap is None or len(np.unique(carriers)) < array.n:
             raise errors.NotApplicable(
                 "the array's channels share carriers, or are not evenly spaced, so that samples cannot be separated "
                 "by frequency; make the echoes with channels='separated'"
             )
-        if raw.waveform.kind != "tone" and raw.waveform.bandwidth > apart * (1 + 1e-9):
+        if raw.waveform.kind != "tone" and raw.waveform.bandwidth > gap * (1 + 1e-9):
             raise errors.NotApplicable(
-                f"channels {apart / 1e6:g} MHz apart share samples: their pulses are "
+                f"channels {gap / 1e6:g} MHz apart share samples: their pulses are "
                 f"{raw.waveform.bandwidth / 1e6:g} MHz wide; make the echoes with channels='separated', or send tones"
             )
-        low, high = frequencies[rows].min(axis=1).max() - apart / 2, frequencies[rows].max(axis=1).min() + apart / 2
+        low, high = (
+            frequencies[rows].min(axis=1).max() - gap / 2,
+            frequencies[rows].max(axis=1).min() + gap / 2,
+        )
         outside = np.flatnonzero((carriers < low) | (carriers > high))
         if len(outside):
             raise ValueError(
                 f"{len(outside)} of the array's {array.n} channels lie outside the sampled band of "
-                f"{(low + apart / 2) / 1e9:.6g} to {(high - apart / 2) / 1e9:.6g} GHz, such as element {outside[0]} at "
+                f"{(low + gap / 2) / 1e9:.6g} to {(high - gap / 2) / 1e9:.6g} GHz, such as element {outside[0]} at "
                 f"{carriers[outside[0]] / 1e9:.6g} GHz; keep all samples that echo returned"
             )
         order = np.argsort(carriers)
-        place = np.rint((frequencies[rows] - carriers[order[0]]) / apart)
-        steps = np.rint((carriers[order] - carriers[order[0]]) / apart)
+        place = np.rint((frequencies[rows] - carriers[order[0]]) / gap)
+        steps = np.rint((carriers[order] - carriers[order[0]]) / gap)
         at = np.clip(np.searchsorted(steps, place), 0, array.n - 1)
         out[rows] = order[at]
     return out

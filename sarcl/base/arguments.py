@@ -22,10 +22,10 @@ def path(name: str, value: object) -> Path:
     """`value` as a Path; TypeError for what is no name of a file, ValueError for one that no system takes."""
     if not isinstance(value, (str, os.PathLike)) or isinstance(os.fspath(value), bytes):
         raise TypeError(f"{name} is a {type(value).__name__}; give the name of a file, a string or a pathlib.Path")
-    made = Path(value)
-    if len(str(made)) > LONGEST_NAME:
-        raise ValueError(f"{name} has {len(str(made))} characters: {str(made)!r:.60}; no path is that long: shorten it")
-    return made
+    file = Path(value)
+    if len(str(file)) > LONGEST_NAME:
+        raise ValueError(f"{name} has {len(str(file))} characters: {str(file)!r:.60}; no path is that long: shorten it")
+    return file
 
 
 def text(name: str, value: object) -> str | None:
@@ -62,12 +62,12 @@ def chosen(name: str, value: Any, n: int, what: str) -> np.ndarray:
     import numpy as np
 
     try:
-        made = np.atleast_1d(np.arange(n)[value])
+        numbers = np.atleast_1d(np.arange(n)[value])
     except (IndexError, TypeError, ValueError):
-        made = None
-    if made is None or made.ndim != 1:
+        numbers = None
+    if numbers is None or numbers.ndim != 1:
         raise IndexError(
             f"{name} is {shown(value)}, which chooses none of {n} {what}; give a slice, whole numbers from {-n} to "
             f"{n - 1}, or a mask of {n} values True and False"
         )
-    return made
+    return numbers

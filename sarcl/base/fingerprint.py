@@ -13,10 +13,10 @@ import numpy as np
 
 def checker(*parts: Any) -> Any:
     """A checksum object that has taken `parts`, bytes or views of them."""
-    made = hashlib.blake2b(digest_size=32)
+    digest = hashlib.blake2b(digest_size=32)
     for part in parts:
-        made.update(part)
-    return made
+        digest.update(part)
+    return digest
 
 
 def as_bytes(values: np.ndarray) -> np.ndarray:
@@ -26,15 +26,15 @@ def as_bytes(values: np.ndarray) -> np.ndarray:
 
 def checksum(*values: object) -> str:
     """Checksum of arrays, numbers (or tuples of them), strings and None, with shapes and types."""
-    made = checker()
+    digest = checker()
     for value in values:
         if value is None or isinstance(value, str):
-            made.update(repr(value).encode())
+            digest.update(repr(value).encode())
         else:
             array = np.asarray(value)
-            made.update(f"{array.dtype.str}{array.shape}".encode())
-            made.update(as_bytes(array))
-    return str(made.hexdigest()[:32])
+            digest.update(f"{array.dtype.str}{array.shape}".encode())
+            digest.update(as_bytes(array))
+    return str(digest.hexdigest()[:32])
 
 
 def leaves(value: Any) -> list[Any]:

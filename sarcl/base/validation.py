@@ -22,11 +22,11 @@ def array(name: str, value: object, dtype: DTypeLike, shape: tuple[int | str, ..
     argument, its shape or the index of its first NaN or Inf.
     """
     out = converted(name, value, dtype)
-    wanted = "(" + ", ".join(str(n) for n in shape) + ("," if len(shape) == 1 else "") + ")"
+    shape_text = "(" + ", ".join(str(n) for n in shape) + ("," if len(shape) == 1 else "") + ")"
     if out.ndim != len(shape) or any(isinstance(n, int) and n != m for n, m in zip(shape, out.shape, strict=False)):
-        raise ValueError(f"{name} has shape {out.shape}, wanted {wanted}")
+        raise ValueError(f"{name} has shape {out.shape}, wanted {shape_text}")
     if out.size == 0:
-        raise ValueError(f"{name} is empty (shape {out.shape}), wanted {wanted} with at least one element")
+        raise ValueError(f"{name} is empty (shape {out.shape}), wanted {shape_text} with at least one element")
     finite(name, out)
     return sealed(out)
 
@@ -55,10 +55,10 @@ def flag(name: str, value: object) -> bool:
 
 def flags(name: str, value: object) -> Any:
     """`value`, one or several of True, False, 1 and 0; TypeError for anything else, which NumPy may take for True."""
-    given = np.asarray(value) if ndim(name, value) else None
-    if given is None:
+    states = np.asarray(value) if ndim(name, value) else None
+    if states is None:
         return flag(name, value)
-    if given.dtype.kind not in "biuf" or not ((given == 0) | (given == 1)).all():
+    if states.dtype.kind not in "biuf" or not ((states == 0) | (states == 1)).all():
         raise TypeError(f"{name} is {shown(value)}; give True or False for each")
     return value
 
@@ -95,10 +95,10 @@ def room(what: str, n_bytes: float, remedy: str) -> None:
         raise MemoryError(f"{what} needs {size_text(n_bytes)}, this machine has {size_text(installed())}; {remedy}")
 
 
-def sealed(made: np.ndarray) -> np.ndarray:
-    """`made` itself, made read-only: for arrays that only the caller holds, so that PhaseHistory need not copy them."""
-    made.flags.writeable = False
-    return made
+def sealed(values: np.ndarray) -> np.ndarray:
+    """`values`, read-only from here on: for arrays that only the caller holds, so that PhaseHistory copies none."""
+    values.flags.writeable = False
+    return values
 
 
 class _NoNumbers(TypeError):
@@ -107,32 +107,32 @@ class _NoNumbers(TypeError):
 
 def converted(name: str, value: object, dtype: DTypeLike) -> np.ndarray:
     """A copy of `value` as an array of `dtype` in C order; ValueError where that would change its numbers."""
-    wanted = np.dtype(dtype)
+    number_type = np.dtype(dtype)
     ndim(name, value)
     without_unit(name, value)
     try:
-        given = np.asarray(value)
-        if given.dtype.kind not in "biufcO":
-            raise _NoNumbers(f"type {given.dtype}")
-        if given.dtype.kind == "O":
-            none = [v for v in given.flat if isinstance(v, type) or not isinstance(v, NUMBERS)]
+        source = np.asarray(value)
+        if source.dtype.kind not in "biufcO":
+            raise _NoNumbers(f"type {source.dtype}")
+        if source.dtype.kind == "O":
+            none = [v for v in source.flat if isinstance(v, type) or not isinstance(v, NUMBERS)]
             if none:
                 raise _NoNumbers(f"{'None' if none[0] is None else 'a ' + type(none[0]).__name__} is no number")
-        if given.dtype.kind == "c" and wanted.kind != "c":
-            raise _NoNumbers(f"type {given.dtype}: take the real part or the modulus")
+        if source.dtype.kind == "c" and number_type.kind != "c":
+            raise _NoNumbers(f"type {source.dtype}: take the real part or the modulus")
         if np.ma.is_masked(value):
             raise _NoNumbers(f"{np.ma.count_masked(value)} values are masked: fill or remove them")
-        if wanted.kind in "iu" and given.dtype.kind == "f" and not (given == np.rint(given)).all():
+        if number_type.kind in "iu" and source.dtype.kind == "f" and not (source == np.rint(source)).all():
             raise _NoNumbers("not all are whole numbers")
         with np.errstate(all="ignore"):
-            made = np.array(given, dtype=wanted, order="C")
-        if wanted.kind in "iu" and not (made == given).all():  # the largest numbers come back as negative ones
+            numbers = np.array(source, dtype=number_type, order="C")
+        if number_type.kind in "iu" and not (numbers == source).all():  # the largest numbers come back as negative ones
             raise _NoNumbers("not all are small enough")
-        return made
+        return numbers
     except (TypeError, ValueError, OverflowError) as exc:
         why = "not all are small enough" if isinstance(exc, OverflowError) else "not all are numbers"
         why = str(exc) if isinstance(exc, _NoNumbers) else why
-        raise ValueError(f"{name} must be numbers that fit {wanted}, got {shown(value, 80)} ({why})") from None
+        raise ValueError(f"{name} must be numbers that fit {number_type}, got {shown(value, 80)} ({why})") from None
 
 
 def unmasked(name: str, value: object, first_row: int = 0, remedy: str = "fill them, with 0 where nothing came") -> Any:
@@ -208,10 +208,10 @@ def count(name: str, value: Any, least: int | None = 1) -> int:
         if np.iscomplexobj(value) or np.ma.is_masked(value):
             raise TypeError
         out = int(value)
-        whole = out == value
+        is_whole = out == value
     except (TypeError, ValueError, OverflowError):
         raise ValueError(f"{name} must be a whole number, got {value!r:.80}") from None
-    if not whole or isinstance(value, (bool, np.bool_)):
+    if not is_whole or isinstance(value, (bool, np.bool_)):
         raise ValueError(f"{name} must be a whole number, got {value!r:.80}")
     if least is not None and out < least:
         raise ValueError(f"{name} is {out}; it must be at least {least}")

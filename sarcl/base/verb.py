@@ -54,26 +54,26 @@ def verb(
     plan_list  plan_list(plan, *subjects, options) plans such a list
     """
 
-    def made(plan: Callable[..., Plan[R]]) -> Verb[R]:
+    def decorate(plan: Callable[..., Plan[R]]) -> Verb[R]:
         signature = inspect.signature(plan)
         subjects = [p for p in signature.parameters.values() if p.name != "options"]
         names, known = [p.name for p in subjects], list(described(record))
 
-        def planned(*args: object, **given: object) -> Plan[R]:
+        def planned(*args: object, **options_by_name: object) -> Plan[R]:
             if len(args) > len(names):
                 raise TypeError(f"{plan.__name__} takes {', '.join(names)} by position; give options by name")
-            for name in given:
+            for name in options_by_name:
                 if name not in known and name not in names:
                     raise TypeError(f"{plan.__name__} has {unknown(name, known, 'option')}")
-            own = {name: given.pop(name) for name in names if name in given}
-            options = record(**given)
+            own = {name: options_by_name.pop(name) for name in names if name in options_by_name}
+            options = record(**options_by_name)
             if plan_list and isinstance((dict(zip(names, args, strict=False)) | own).get(lists[0]), (list, tuple)):
                 return plan_list(plan, *args, **own, options=options)  # type: ignore[return-value]  # as the stub says
             return plan(*args, **own, options=options)
 
         @functools.wraps(plan)
-        def function(*args: object, **given: object) -> R:
-            return function.planned(*args, **given).run()  # type: ignore[attr-defined]
+        def function(*args: object, **options_by_name: object) -> R:
+            return function.planned(*args, **options_by_name).run()  # type: ignore[attr-defined]
 
         function.planned, function.options, function.lists = planned, record, lists  # type: ignore[attr-defined]
         function.__signature__ = signature.replace(  # type: ignore[attr-defined]
@@ -83,7 +83,7 @@ def verb(
         function.__doc__ = inspect.cleandoc(plan.__doc__ or "").replace(MARK, listed(record))
         return function  # type: ignore[return-value]
 
-    return made
+    return decorate
 
 
 def result_of(annotation: str) -> str:

@@ -50,12 +50,12 @@ def devices(args: argparse.Namespace, job: Job) -> int:
     from ..opencl import device_list
     from ..opencl.choose_device import NoDeviceError, open_devices
 
-    found = device_list.tried_again()
-    works = any(d.works for d in found)
+    infos = device_list.tried_again()
+    works = any(d.works for d in infos)
     try:
-        print(device_table(found, [d.info.index for d in open_devices(None)]))
+        print(device_table(infos, [d.info.index for d in open_devices(None)]))
     except NoDeviceError as exc:
-        print(device_table(found, []))
+        print(device_table(infos, []))
         print(f"sarcl: {'' if works else 'error: '}{exc}", file=sys.stderr)
     return 0 if works else 3
 
@@ -136,7 +136,7 @@ def focus(args: argparse.Namespace, job: Job) -> int:
     check_pieces(args, outputs)
     job.expect_named(outputs, formats.writing("picture", "image"), [*args.raw, *([args.grid] if args.grid else [])])
     _check_scale(args)
-    given = _grid_options(args)
+    place = _grid_options(args)
     grid = None if args.grid is None else load(args.grid).build_grid()
     raw = read(args.raw if len(args.raw) > 1 else args.raw[0], autofocus=args.autofocus)
     if not isinstance(raw, PhaseHistory):
@@ -153,14 +153,14 @@ def focus(args: argparse.Namespace, job: Job) -> int:
     else:
         check_default_grid(args, raw)
     if grid is None and method.name != "range_doppler":
-        grid = _default_grid(raw, job, {**given, "side": args.side, "heights": levels})
+        grid = _default_grid(raw, job, {**place, "side": args.side, "heights": levels})
     if method.name != "backproject":  # by one device
         devices = devices[0]
     if args.dry_run:
-        made = method.plan(raw, grid, devices)
+        forecast = method.plan(raw, grid, devices)
         if grid is None:
-            job.say(f"grid: {made.plan['pixels']} zero-Doppler times x slant ranges")
-        print(made)
+            job.say(f"grid: {forecast.plan['pixels']} zero-Doppler times x slant ranges")
+        print(forecast)
         return 0
     running = {} if method.name != "backproject" else {"tile": args.tile, "resume": args.resume}
     _check_room(grid, outputs)
@@ -185,15 +185,15 @@ def measure(args: argparse.Namespace, job: Job) -> int:
     from ..analysis import point_response
 
     near = args.near[0] if args.near and len(args.near) == 1 else args.near
-    made = point_response.measure(image, near=near)
-    if isinstance(made, tuple):
-        print("\n\n".join(map(str, made)))
+    responses = point_response.measure(image, near=near)
+    if isinstance(responses, tuple):
+        print("\n\n".join(map(str, responses)))
         return 0
-    print(made)
+    print(responses)
     if args.plot is not None:
         from ..figures.decibels import write_png
 
-        write_png(made.show(), args.plot)
+        write_png(responses.show(), args.plot)
         job.say(f"wrote {args.plot}")
     return 0
 
@@ -221,24 +221,24 @@ def _grid_options(args: argparse.Namespace) -> dict[str, Any]:
     from ..model.image_grid import ImageGrid
 
     names = ("center", "shape", "spacing", "normal", "x_axis")
-    given = {n: getattr(args, n) for n in names if getattr(args, n) is not None}
-    if args.grid is not None and given:
-        other = next(iter(given)).replace("_", "-")
+    values = {n: getattr(args, n) for n in names if getattr(args, n) is not None}
+    if args.grid is not None and values:
+        other = next(iter(values)).replace("_", "-")
         raise ValueError(f"--grid and --{other} both describe the grid; give one or the other")
-    ImageGrid.plane(**{"shape": 1, "spacing": 1.0, **given})
-    return given
+    ImageGrid.plane(**{"shape": 1, "spacing": 1.0, **values})
+    return values
 
 
-def _default_grid(raw: PhaseHistory, job: Job, given: dict[str, Any]) -> ImageGrid:
+def _default_grid(raw: PhaseHistory, job: Job, options: dict[str, Any]) -> ImageGrid:
     from ..imaging.default_grid import default_grid
 
-    chosen = default_grid(raw, **given)
-    grid = chosen.grid
+    choice = default_grid(raw, **options)
+    grid = choice.grid
     assert grid.spacing is not None and grid.center is not None
     pixels = f"{grid.shape[0]} x {grid.shape[1]} pixels of {grid.spacing[0]:.4g} x {grid.spacing[1]:.4g} m"
     job.say(f"grid: {pixels} about ({', '.join(f'{c:.6g}' for c in grid.center)})")
-    if chosen.why:
-        job.say(f"      from the data: {chosen.why}")
+    if choice.why:
+        job.say(f"      from the data: {choice.why}")
     return grid
 
 

@@ -19,10 +19,10 @@ Outputs = dict[str, tuple[int, int] | None]
 def identity(path: PathLike) -> tuple[int, int] | None:
     """Inode and time of a file, which change when another file replaces it; None where there is no file."""
     try:
-        found = os.stat(path)
+        status = os.stat(path)
     except OSError:
         return None
-    return found.st_ino, found.st_mtime_ns
+    return status.st_ino, status.st_mtime_ns
 
 
 def complete(outputs: Outputs) -> list[str]:
@@ -91,13 +91,13 @@ class Job:
 
     def expect_named(self, paths: list[str], among: list[formats.Format], inputs: list[str], n_bytes: int = 0) -> None:
         """Refuse outputs that cannot be written, that are inputs, or that are named twice."""
-        taken = {Path(p).resolve() for p in inputs}
+        sources = {Path(p).resolve() for p in inputs}
         for path in paths:
-            if Path(path).resolve() in taken:
+            if Path(path).resolve() in sources:
                 raise ValueError(f"output {path!r} is also read by this command; choose another name")
             if formats.named(path, among) is None:
-                wanted = formats.suggested(among)
-                raise ValueError(f"output {path!r} {formats.ending_of(path)}; choose a name that ends in {wanted}")
+                endings = formats.suggested(among)
+                raise ValueError(f"output {path!r} {formats.ending_of(path)}; choose a name that ends in {endings}")
             self.expect(path, n_bytes)
         if len({Path(p).resolve() for p in paths}) < len(paths):
             raise ValueError(f"outputs {', '.join(paths)} name one file twice")

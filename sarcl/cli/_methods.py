@@ -44,14 +44,14 @@ class Method:
     def of(cls, args: argparse.Namespace) -> Method:
         """The method that is asked for. ValueError names an option that it does not take."""
         name = args.method if args.method in TAKES else "backproject"
-        given = {k: v for k, v in vars(args).items() if v is not None and v is not False and k != "method"}
-        for option in given:
+        values = {k: v for k, v in vars(args).items() if v is not None and v is not False and k != "method"}
+        for option in values:
             others = [n for n in TAKES if option in TAKES[n]]
             if others and name not in others:
                 raise ValueError(
                     f"--{option.replace('_', '-')} is for {' or '.join(others)}; --method {args.method} {WHY[name]}"
                 )
-        options = {k: given[k] for k in DEFAULTS[name] if k in given and k in TAKES[name] and k not in RUN}
+        options = {k: values[k] for k in DEFAULTS[name] if k in values and k in TAKES[name] and k not in RUN}
         if name == "backproject":
             options["method"] = args.method
         return cls(name, options)
@@ -96,12 +96,12 @@ def check_default_grid(args: argparse.Namespace, raw: PhaseHistory) -> None:
     """ValueError for --side and --heights where no grid is chosen from Earth-fixed echoes."""
     from ..imaging.default_grid import needs_side
 
-    given = next((n for n in ("side", "heights") if getattr(args, n) is not None), None)
-    if given is not None and (args.grid is not None or args.center is not None or not needs_side(raw)):
+    name = next((n for n in ("side", "heights") if getattr(args, n) is not None), None)
+    if name is not None and (args.grid is not None or args.center is not None or not needs_side(raw)):
         local = args.grid is None and args.center is None
         why = "the echoes are in local coordinates" if local else "the grid is given"
         raise ValueError(
-            f"--{given} places the grid that is chosen for Earth-fixed echoes, and {why}: leave it out, or take "
+            f"--{name} places the grid that is chosen for Earth-fixed echoes, and {why}: leave it out, or take "
             "--method range_doppler"
         )
 

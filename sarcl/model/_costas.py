@@ -59,9 +59,9 @@ def _constructions(p: int) -> list[np.ndarray]:
     square = [
         a for a in element[primitive].tolist() if (a * a + a) % p == 1
     ]  # two by two points in the corner (Taylor)
-    chosen = [(int(a), int((1 - a) % p)) for a in pairs[:1]] + [(a, a) for a in square[:1]]
+    generators = [(int(a), int((1 - a) % p)) for a in pairs[:1]] + [(a, a) for a in square[:1]]
     number = np.arange(1, p - 1)
-    for a, b in chosen:
+    for a, b in generators:
         rest = (1 - power[number * log[a] % (p - 1)]) % p
         arrays.append(log[rest] * pow(int(log[b]), -1, p - 1) % (p - 1) - 1)
     return arrays

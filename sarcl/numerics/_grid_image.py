@@ -36,8 +36,8 @@ class OnHost:
         """Rows first ... of the grid, in a buffer (rows, length[1])."""
         if self._half is None:
             self._half = np.empty((len(self.flat[1]), self.length[0]), np.complex64)
-        made = self.device.download(grid, np.empty((rows, self.length[1]), np.complex64))
-        _transposed(fft.rows(None, made, inverse=True), self._half[:, first : first + rows])
+        band = self.device.download(grid, np.empty((rows, self.length[1]), np.complex64))
+        _transposed(fft.rows(None, band, inverse=True), self._half[:, first : first + rows])
 
     def image(self) -> np.ndarray:
         """The image complex64, after all rows of the grid."""
@@ -94,11 +94,11 @@ class OnDevice:
             self._grid = grid
         else:
             band, stride, start = device.empty(8 * columns * rows), rows, 0
-        made = self._transforms
-        for row in range(0, rows, made.most):
-            count = min(made.most, rows - row)
-            made.rows(grid, row, count)
-            made.lay(band, stride, start + row, count, (self._flat[1], columns), columns // 2, -1)
+        transforms = self._transforms
+        for row in range(0, rows, transforms.most):
+            count = min(transforms.most, rows - row)
+            transforms.rows(grid, row, count)
+            transforms.lay(band, stride, start + row, count, (self._flat[1], columns), columns // 2, -1)
         if not self.whole:
             self._half[:, first : first + rows] = device.download(band, np.empty((columns, rows), np.complex64))
 
@@ -106,20 +106,20 @@ class OnDevice:
         """The image complex64, after all rows of the grid."""
         device, (rows, columns) = self.device, self.shape
         self._transforms = None  # frees its buffer
-        made = Transforms(device, self.length[0], columns, self._work)
+        transforms = Transforms(device, self.length[0], columns, self._work)
         weights = (self._flat[0], rows)
         image = np.empty(self.shape, np.complex64)
         if self.whole:
-            for first in range(0, columns, made.most):
-                count = min(made.most, columns - first)
-                made.rows(self._half, first, count)
-                made.lay(self._grid, columns, first, count, weights, rows // 2, -1)
+            for first in range(0, columns, transforms.most):
+                count = min(transforms.most, columns - first)
+                transforms.rows(self._half, first, count)
+                transforms.lay(self._grid, columns, first, count, weights, rows // 2, -1)
             return device.download(self._grid, image)
-        for first in range(0, columns, made.most):
-            part = self._half[first : first + made.most]
-            made.rows(device.upload(part), 0, len(part))
+        for first in range(0, columns, transforms.most):
+            part = self._half[first : first + transforms.most]
+            transforms.rows(device.upload(part), 0, len(part))
             out = device.empty(8 * rows * len(part))
-            made.lay(out, len(part), 0, len(part), weights, rows // 2, -1)
+            transforms.lay(out, len(part), 0, len(part), weights, rows // 2, -1)
             image[:, first : first + len(part)] = device.download(out, np.empty((rows, len(part)), np.complex64))
         return image
 

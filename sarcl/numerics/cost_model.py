@@ -186,9 +186,9 @@ class DeviceClass(NamedTuple):
         if any(info.vector_width > 1 for info in infos):
             return cls(all(info.vector_width > 1 for info in infos))
         shared = min(min(info.local_memory, MOST_LOCAL) for info in infos)
-        enough = all(info.max_group >= MOST_ITEMS for info in infos)
+        groups_fit = all(info.max_group >= MOST_ITEMS for info in infos)
         gathering = ON_GPU if all(info.fp64 and info.fast_fp64 for info in infos) else ON_GPU_IN_PAIRS
-        return cls(False, shared if enough else 0, gathering, native_error)
+        return cls(False, shared if groups_fit else 0, gathering, native_error)
 
     def native_pays(self, tolerance: float) -> bool:
         """Whether the error of the devices' own sine and cosine is small beside a tolerance."""

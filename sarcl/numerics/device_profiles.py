@@ -136,8 +136,8 @@ class SpreadSamples:
         device = self.device
         if self._batches is None:
             stride = self.length + 2 * self.pad
-            made = device.download(sums, np.empty((parts, rows, planes, stride), np.complex64))
-            total = made[:, :, -2:].sum(axis=(0, 2), dtype=np.complex128).astype(np.complex64)
+            profiles = device.download(sums, np.empty((parts, rows, planes, stride), np.complex64))
+            total = profiles[:, :, -2:].sum(axis=(0, 2), dtype=np.complex128).astype(np.complex64)
             return range_profiles.to_samples(device, total, self.n_samples, self.interpolator, self.n_rows)
         fold, cut = (device.kernel("range_profiles.cl", name, **SINGLE) for name in ("fold", "cut"))
         if self._correction is None:

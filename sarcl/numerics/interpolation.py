@@ -71,8 +71,8 @@ def interpolator(taps: int, oversample: float) -> Interpolator:
 def interpolator_float64(taps: int, oversample: float) -> Interpolator:
     """The interpolation kernel for float64 profiles: as few terms as bring its error near that of many."""
     best = deconvolved(taps, oversample, FLOAT64_TERMS[-1], np.float64)
-    tried = (deconvolved(taps, oversample, terms, np.float64) for terms in FLOAT64_TERMS)
-    return next(made for made in tried if made.error <= 1.3 * best.error + 1e-15)
+    candidates = (deconvolved(taps, oversample, terms, np.float64) for terms in FLOAT64_TERMS)
+    return next(candidate for candidate in candidates if candidate.error <= 1.3 * best.error + 1e-15)
 
 
 @functools.lru_cache(maxsize=1024)
@@ -111,11 +111,11 @@ def fitted(taps: int, oversample: float) -> Interpolator:
     for _ in range(FITS):
         correction = _transform(table, nu) / _transform(table, np.zeros(1))
         halves = (np.cos(angle), powers, np.cos(wave)), (np.sin(angle), powers * z, np.sin(wave))
-        for i, (turns, parts, wanted) in enumerate(halves):
+        for i, (turns, parts, target) in enumerate(halves):
             # waves of taps k and taps - 1 - k together: (z, nu, tap, term)
             waves = 2 * (turns / correction[:, None])[:, :, None] * parts[:, None, None, :]
-            found = np.linalg.lstsq(waves.reshape(wanted.size, -1), wanted.ravel(), rcond=None)[0]
-            table[:, i] = found.reshape(taps // 2, terms)
+            coefficients = np.linalg.lstsq(waves.reshape(target.size, -1), target.ravel(), rcond=None)[0]
+            table[:, i] = coefficients.reshape(taps // 2, terms)
     return _of_table(table.astype(np.float32), oversample)
 
 
@@ -155,13 +155,13 @@ def line_interpolator(taps: int, oversample: float) -> Interpolator:
 
 
 @functools.lru_cache(maxsize=256)
-def slope_error(made: Interpolator) -> float:
+def slope_error(kernel: Interpolator) -> float:
     """Largest error of the weights' derivatives by position, over the derivative at the band's edge."""
-    z, nu = np.linspace(-0.5, 0.5, 65), np.linspace(0, 0.5 / made.oversample, 33)
-    waves = np.exp(2j * np.pi * nu[:, None, None] * (_positions(made.taps) - z[:, None]))
-    found = (waves * _slopes(made.table, z)).sum(axis=-1)
-    wanted = 2j * np.pi * nu[:, None]
-    return MARGIN * float(np.abs(found - wanted).max() / np.abs(wanted).max())
+    z, nu = np.linspace(-0.5, 0.5, 65), np.linspace(0, 0.5 / kernel.oversample, 33)
+    waves = np.exp(2j * np.pi * nu[:, None, None] * (_positions(kernel.taps) - z[:, None]))
+    slopes = (waves * _slopes(kernel.table, z)).sum(axis=-1)
+    exact = 2j * np.pi * nu[:, None]
+    return MARGIN * float(np.abs(slopes - exact).max() / np.abs(exact).max())
 
 
 @functools.lru_cache(maxsize=256)
@@ -177,9 +177,9 @@ def _least_squares(taps: int, oversample: float) -> Interpolator:
 def least_squares_weights(taps: int, oversample: float, z: np.ndarray) -> np.ndarray:
     """Weights (n, taps) of the best interpolation at z (n,) of signals below 1/(2 oversample) cycles per sample."""
     nu = 0.5 / oversample * np.cos(np.pi * (np.arange(40) + 0.5) / 80)  # denser at the band's edge, where errors are
-    angle, wanted = 2 * np.pi * nu[:, None] * _positions(taps), 2 * np.pi * nu[:, None] * z
+    angle, phase = 2 * np.pi * nu[:, None] * _positions(taps), 2 * np.pi * nu[:, None] * z
     waves = np.concatenate([np.cos(angle), np.sin(angle)])
-    return np.linalg.lstsq(waves, np.concatenate([np.cos(wanted), np.sin(wanted)]), rcond=None)[0].T
+    return np.linalg.lstsq(waves, np.concatenate([np.cos(phase), np.sin(phase)]), rcond=None)[0].T
 
 
 HAT = np.array([[[0.5], [-1.0]]])  # the table of the hat: weights 1/2 - z and 1/2 + z
@@ -233,8 +233,8 @@ def _largest_error(table: np.ndarray, nu: np.ndarray, transform: np.ndarray) -> 
     """Largest error of exp(j 2 pi nu t) interpolated by a table, relative, at any nu and position."""
     z = np.linspace(-0.5, 0.5, 65)
     waves = np.exp(2j * np.pi * nu[:, None, None] * (_positions(2 * len(table)) - z[:, None]))
-    made = (waves * _weights(table, z)).sum(axis=-1) / transform[:, None]
-    return MARGIN * float(np.abs(made - 1).max())
+    interpolated = (waves * _weights(table, z)).sum(axis=-1) / transform[:, None]
+    return MARGIN * float(np.abs(interpolated - 1).max())
 
 
 @functools.cache

@@ -30,8 +30,8 @@ def profile_length(oversample: float, n_samples: int, taps: int) -> int:
 def lengths(n_samples: int) -> tuple[int, ...]:
     """Lengths of the profiles of rows of n_samples that a plan may take, in float32 or float64."""
     taps = (*interpolation.TERMS, *FLOAT64_TAPS)
-    found = {profile_length(s, n_samples, t) for s in OVERSAMPLE for t in taps}
-    return tuple(sorted(n for n in found if n <= max(LONGEST, 2 * n_samples * max(interpolation.TERMS))))
+    candidates = {profile_length(s, n_samples, t) for s in OVERSAMPLE for t in taps}
+    return tuple(sorted(n for n in candidates if n <= max(LONGEST, 2 * n_samples * max(interpolation.TERMS))))
 
 
 @functools.lru_cache(maxsize=256)
@@ -96,9 +96,9 @@ def choose_interpolator(
     for cost, taps, oversample, length in _by_cost(n_samples, pairs_per_row, carrier, gathering):
         for least_of, make in families:
             if least_of(taps, oversample) <= error:
-                made = make(taps, oversample)
-                if made.error <= error:
-                    return made, length, cost / pairs_per_row
+                interpolator = make(taps, oversample)
+                if interpolator.error <= error:
+                    return interpolator, length, cost / pairs_per_row
     least = rounded_up(least_error(n_samples, carrier))
     raise ToleranceUnreachable(error, least, "interpolation of float32 range profiles")
 

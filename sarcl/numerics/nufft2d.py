@@ -227,7 +227,7 @@ class Gridder:
         end, (band, block) = self._parts(budget, shape, samples.row_bytes)
         n_rows, n_tiles = len(self.cell), -(-m0 // self.tile)
         pipeline = Pipeline(self.device)
-        given = out = None
+        buffer = out = None
         with pipeline:
             for first in range(0, n_tiles, band):
                 last = min(first + band, n_tiles)
@@ -237,8 +237,8 @@ class Gridder:
                 for start in range(0, n_rows, block):
                     stop = min(start + block, n_rows)
                     pipeline.new_block()
-                    if given is None or block < n_rows:
-                        given = samples.buffer(pipeline, start, stop)
+                    if buffer is None or block < n_rows:
+                        buffer = samples.buffer(pipeline, start, stop)
                         clock.lap("samples")
                     cell, line = (pipeline.upload(a[start:stop]) for a in (self.cell, self.line))
                     self.device.run(
@@ -247,7 +247,7 @@ class Gridder:
                             "nufft2d.cl", "spread", n_rows=stop - start, n_samples=self.n_samples, m0=m0, m1=m1,
                             first=first, add=start > 0,
                         ),
-                        given, cell, line, self.table, out, steps=stop - start,
+                        buffer, cell, line, self.table, out, steps=stop - start,
                     )  # fmt: skip
                     done = 0.8 * (first + (last - first) * stop / n_rows) / n_tiles
 
@@ -260,7 +260,7 @@ class Gridder:
                     end = OnHost(self.device, self.plan.length, end.flat)
                 end.add(out, first * self.tile, rows)
                 clock.lap("fft")
-            given = out = None
+            buffer = out = None
             image = end.image()
         clock.lap("fft")
         on_progress(1.0)

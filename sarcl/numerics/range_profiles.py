@@ -74,9 +74,9 @@ def from_samples(
             f"samples times weights reach {largest:.1e} in rows of {n_samples}; sums in "
             f"{dtype.__name__} hold up to {limit:.0e}: scale the samples down"
         )
-    made = fft.rows(device, within, inverse=True, overwrite=True, n_rows=n_rows)
-    if not np.may_share_memory(made, within):
-        within[:] = made
+    transformed = fft.rows(device, within, inverse=True, overwrite=True, n_rows=n_rows)
+    if not np.may_share_memory(transformed, within):
+        within[:] = transformed
     for start in range(0, pad, length):
         end = min(start + length, pad)
         profiles[:, pad - end : pad - start] = profiles[:, pad - end + length : pad - start + length]

@@ -184,9 +184,9 @@ def _roughest(track: PulseGeometry, decimation: Decimation, center: np.ndarray, 
     way = ((np.arange(len(track)) - np.repeat(first, count)) / decimation.ratio)[:, None]
     before, off = np.repeat(before, count), np.zeros(len(track))
     for antenna, ends in zip(track.ends, decimation.kept.ends, strict=True):
-        pulses, kept = _directions(antenna, center), _directions(ends, center)
-        apart = pulses - (1 - way) * kept[before] - way * kept[before + 1]
-        off = np.maximum(off, dot(apart, apart))
+        pulses, ends_seen = _directions(antenna, center), _directions(ends, center)
+        deviation = pulses - (1 - way) * ends_seen[before] - way * ends_seen[before + 1]
+        off = np.maximum(off, dot(deviation, deviation))
     return np.argpartition(off, max(len(off) - most, 0))[-most:]
 
 

@@ -111,5 +111,5 @@ class WeightedSamples:
         if self._sums is None:
             return 0.0
         sums = self.device.download(self._sums, np.empty((self._n_rows, PARTS), np.float32)).sum(axis=1, dtype=float)
-        done = self._scales > 0
-        return float((sums[done] / self._scales[done] ** 2).sum())
+        used_rows = self._scales > 0
+        return float((sums[used_rows] / self._scales[used_rows] ** 2).sum())

@@ -49,19 +49,19 @@ def weights(window: Window | None, n: int) -> np.ndarray:
     """
     n = validation.count("n", n)
     if is_array(window):
-        made = validation.array("window", window, np.float64, (n,))
+        w = validation.array("window", window, np.float64, (n,))
     else:
-        made = _named(*_name(window), n)
-    if not np.isfinite(made).all():
+        w = _named(*_name(window), n)
+    if not np.isfinite(w).all():
         raise ValueError(
             f"window {shown(window)} of {n} cells has weights that are not finite; its parameters are too large or 0"
         )
-    if (made < 0).any() or not made.any():
+    if (w < 0).any() or not w.any():
         raise ValueError(
-            f"window {shown(window)} has weights of {made.min():g} to {made.max():g}; a weight is not "
+            f"window {shown(window)} has weights of {w.min():g} to {w.max():g}; a weight is not "
             "below zero, and not all are zero"
         )
-    return made
+    return w
 
 
 def table(window: Window | None) -> np.ndarray:
@@ -70,9 +70,9 @@ def table(window: Window | None) -> np.ndarray:
     An array of weights is interpolated between its own cells. ValueError for a window without a continuous form.
     """
     if is_array(window):
-        given = weights(window, len(np.asarray(window)))
-        n = len(given)
-        return np.interp((np.arange(TABLE) + 0.5) / TABLE, (np.arange(n) + 0.5) / n, given)
+        w = weights(window, len(np.asarray(window)))
+        n = len(w)
+        return np.interp((np.arange(TABLE) + 0.5) / TABLE, (np.arange(n) + 0.5) / n, w)
     name, _ = _name(window)
     if name in OF_CELLS:
         raise ValueError(
@@ -167,18 +167,18 @@ def _name(window: object) -> tuple[str, tuple[Any, ...]]:
 
     if name in ("taylor", "hamming") or name not in windows.__all__ or name == "get_window":
         raise ValueError(f"window is {shown(window)}; known are {KNOWN}")
-    wanted = [p for p in inspect.signature(getattr(windows, name)).parameters.values() if p.name in PARAMETERS]
-    least = sum(p.default is inspect.Parameter.empty for p in wanted)
-    if not least <= len(rest) <= len(wanted):
-        names = ", ".join(p.name for p in wanted) or "no parameters"
+    parameters = [p for p in inspect.signature(getattr(windows, name)).parameters.values() if p.name in PARAMETERS]
+    least = sum(p.default is inspect.Parameter.empty for p in parameters)
+    if not least <= len(rest) <= len(parameters):
+        names = ", ".join(p.name for p in parameters) or "no parameters"
         raise ValueError(f"window is {shown(window)}; {name!r} takes {names}")
-    for p, value in zip(wanted, rest, strict=False):
+    for p, value in zip(parameters, rest, strict=False):
         if p.name == "a":
             validation.array("general_cosine a", value, np.float64, ("n",))
         elif value is not None:
-            given = validation.number(f"{name} {p.name}", value)
+            number = validation.number(f"{name} {p.name}", value)
             if p.name in LARGEST:
-                _bounded(f"{name} {p.name}", given)
+                _bounded(f"{name} {p.name}", number)
     return name, tuple(rest)
 
 
@@ -226,13 +226,13 @@ def _taylor(u: np.ndarray, sidelobe_db: float, nbar: float) -> np.ndarray:
     a2 = (np.arccosh(10 ** (sidelobe_db / 20)) / np.pi) ** 2
     m = np.arange(1, int(nbar))
     stretch = nbar**2 / (a2 + (nbar - 0.5) ** 2)
-    above = np.prod(1 - m[:, None] ** 2 / stretch / (a2 + (m - 0.5) ** 2), axis=1)
-    below = np.prod(1 - m[:, None] ** 2 / m**2 + np.eye(len(m)), axis=1)  # the factor of m itself is left out
-    f = -((-1.0) ** m) * above / below / 2
-    made = (1 + 2 * np.cos(2 * np.pi * u[:, None] * m) @ f) / (1 + 2 * f.sum())
-    if (made <= 0).any():
+    numerator = np.prod(1 - m[:, None] ** 2 / stretch / (a2 + (m - 0.5) ** 2), axis=1)
+    denominator = np.prod(1 - m[:, None] ** 2 / m**2 + np.eye(len(m)), axis=1)  # the factor of m itself is left out
+    f = -((-1.0) ** m) * numerator / denominator / 2
+    w = (1 + 2 * np.cos(2 * np.pi * u[:, None] * m) @ f) / (1 + 2 * f.sum())
+    if (w <= 0).any():
         raise ValueError(
             f"taylor window of {sidelobe_db:g} dB with nbar {nbar:g} has weights below zero; "
             "lower nbar or raise sidelobe_db"
         )
-    return made
+    return w

@@ -98,7 +98,7 @@ def _temporary() -> str:
             path.mkdir(mode=0o700)
         except FileExistsError:
             pass
-        found = os.lstat(path)
-        if stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and not stat.S_IMODE(found.st_mode) & 0o077:
+        status = os.lstat(path)
+        if stat.S_ISDIR(status.st_mode) and status.st_uid == os.getuid() and not stat.S_IMODE(status.st_mode) & 0o077:
             return str(path)
     return tempfile.mkdtemp(prefix="sarcl-cache-")

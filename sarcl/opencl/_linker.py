@@ -25,7 +25,7 @@ def trouble(index: int) -> str:
     with tempfile.TemporaryDirectory(prefix="sarcl-trial-") as folder:
         own = {"XDG_CACHE_HOME": folder, "POCL_CACHE_DIR": folder, "PYOPENCL_NO_CACHE": "1"}
         try:
-            done = subprocess.run(
+            process = subprocess.run(
                 [sys.executable, "-c", TRIAL, str(index)],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
@@ -35,7 +35,7 @@ def trouble(index: int) -> str:
             )
         except (OSError, subprocess.TimeoutExpired):
             return ""
-    if done.returncode >= 0:
+    if process.returncode >= 0:
         return ""
     return (
         f"PoCL links kernels with the program ld, and there is none on PATH ({os.environ.get('PATH', '')!r:.200}): add "

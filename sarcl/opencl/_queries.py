@@ -22,7 +22,7 @@ def platforms() -> list[tuple[str, str, list[Any]]]:
     """Name, version and pyopencl's devices of every platform that lists any."""
     import pyopencl
 
-    found = []
+    out = []
     try:
         listed = pyopencl.get_platforms()
     except pyopencl.Error:  # the loader finds no platform
@@ -32,8 +32,8 @@ def platforms() -> list[tuple[str, str, list[Any]]]:
             handles = platform.get_devices()
         except pyopencl.Error:
             continue
-        found.append((text_of(platform, "name"), text_of(platform, "version"), handles))
-    return found
+        out.append((text_of(platform, "name"), text_of(platform, "version"), handles))
+    return out
 
 
 def asked(thing: object, question: str, otherwise: object = None) -> Any:
@@ -88,9 +88,9 @@ def facts(handle: pyopencl.Device) -> dict[str, Any]:
 def _pci(handle: pyopencl.Device) -> str:
     """Bus, device and function of a device on the PCI bus: "41:00.0"; empty where the driver does not tell them."""
     if "cl_khr_pci_bus_info" in str(asked(handle, "extensions", "")).split():
-        found = raw_info(handle, PCI_BUS_INFO, 16)
-        if found:
-            _, bus, device, function = struct.unpack("4I", found)
+        address = raw_info(handle, PCI_BUS_INFO, 16)
+        if address:
+            _, bus, device, function = struct.unpack("4I", address)
             return f"{bus:02x}:{device:02x}.{function:x}"
     bus, slot = asked(handle, "pci_bus_id_nv"), asked(handle, "pci_slot_id_nv")
     if bus is not None and slot is not None:

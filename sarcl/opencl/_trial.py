@@ -163,15 +163,15 @@ def wanted(x: np.ndarray, antenna: np.ndarray) -> list[np.ndarray]:
     high, other = x[0], x[2]
     product = high * other
     a, b = (x[i].astype(np.longdouble) + x[i + 1] for i in (0, 2))
-    whole = np.rint(a)
-    angle = 2 * np.pi * (a - whole)
+    integer = np.rint(a)
+    angle = 2 * np.pi * (a - integer)
     points, at = x[4:7].astype(np.longdouble) + x[7:], antenna[0, :3].astype(np.longdouble) + antenna[1, :3]
     vector = at[:, None] - points
     distance, length = np.sqrt((vector**2).sum(axis=0)), np.sqrt((at**2).sum())
     return [
         *float_pairs.exact_sum(high, other), product, (high.astype(np.float64) * other - product).astype(np.float32),
         a + b, a * b, a / b, np.sqrt(a),
-        whole.astype(np.int64).astype(np.int32), a - whole, np.sin(angle), np.cos(angle),
+        integer.astype(np.int64).astype(np.int32), a - integer, np.sin(angle), np.cos(angle),
         ((points**2).sum(axis=0) - 2 * at @ points) / (distance + length), distance, vector[1],
         np.full(N, np.arange(1, len(GIVEN) + 1) @ GIVEN, np.float32),
         *float_pairs.exact_sum(product, other),

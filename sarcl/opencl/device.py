@@ -176,9 +176,9 @@ class Device:
         """Memory of the host, uint8 (nbytes,), from which the driver copies without the processor's help."""
         memory = self._cl.mem_flags
         with explained(self.info, "page-locked memory", nbytes):
-            held = self._cl.Buffer(self.context, memory.READ_WRITE | memory.ALLOC_HOST_PTR, nbytes)
+            buffer = self._cl.Buffer(self.context, memory.READ_WRITE | memory.ALLOC_HOST_PTR, nbytes)
             write, byte = self._cl.map_flags.WRITE, np.dtype(np.uint8)
-            return np.asarray(self._cl.enqueue_map_buffer(queue, held, write, 0, (nbytes,), byte)[0])
+            return np.asarray(self._cl.enqueue_map_buffer(queue, buffer, write, 0, (nbytes,), byte)[0])
 
     def write_behind(self, queue: pyopencl.CommandQueue, buffer: pyopencl.Buffer, values: np.ndarray) -> pyopencl.Event:
         """Copy `values` into a buffer on a queue of `another_queue`, while the device's own queue goes on.
@@ -228,22 +228,22 @@ class Device:
         """
         if group is None and self.is_cpu:
             group = (1 if size[0] % GROUP else GROUP, *(1 for _ in size[1:]))
-        given = [np.int32(a) if isinstance(a, int) else a for a in args]
-        with explained(self.info, f"kernel {kernel.function_name}", given), self._lock:
+        arguments = [np.int32(a) if isinstance(a, int) else a for a in args]
+        with explained(self.info, f"kernel {kernel.function_name}", arguments), self._lock:
             count = self._counts[kernel] = self._counts.get(kernel, 0) + 1
-            if count == 1 and kernel.num_args != len(given):  # some drivers end the process
-                raise TypeError(f"{kernel.function_name} takes {kernel.num_args} arguments, not {len(given)}")
+            if count == 1 and kernel.num_args != len(arguments):  # some drivers end the process
+                raise TypeError(f"{kernel.function_name} takes {kernel.num_args} arguments, not {len(arguments)}")
             if count == self.limits.launches:
-                kernel.set_scalar_arg_dtypes([_type_of(a) for a in given])
+                kernel.set_scalar_arg_dtypes([_type_of(a) for a in arguments])
             self._arrays.enqueued += 1
             if self.is_cpu:
-                kernel(self.queue, size, group, *given)
+                kernel(self.queue, size, group, *arguments)
                 return
-            need = size_text(buffer_bytes(given))
+            need = size_text(buffer_bytes(arguments))
             self._last = f"kernel {kernel.function_name} or those before it, with buffers of {need},"
 
             def enqueue(size: tuple[int, ...], offset: tuple[int, ...] | None) -> pyopencl.Event:
-                return kernel(self.queue, size, group, *given, global_offset=offset)
+                return kernel(self.queue, size, group, *arguments, global_offset=offset)
 
             fixed = self._fixed.get(kernel, frozenset(range(len(size))))
             self._launches.launch(kernel, size, group, fixed, float(steps), enqueue, self.queue.flush)

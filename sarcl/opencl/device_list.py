@@ -100,18 +100,18 @@ def tried(index: int) -> DeviceInfo:
     info, handle = listed()[index]
     if info.why != NOT_TRIED:
         return info
-    found = _trial_record.find(key := _key(info, handle))
-    if found is None:
+    outcome = _trial_record.find(key := _key(info, handle))
+    if outcome is None:
         if _linker.is_missing(info.platform) and (why := _linker.trouble(index)):
             return replace(info, why=why)
-        found = trial_of(index)
-        if found.settled:
-            _trial_record.keep(key, found)
-    if found.why:
-        return replace(info, why=found.why)
+        outcome = trial_of(index)
+        if outcome.settled:
+            _trial_record.keep(key, outcome)
+    if outcome.why:
+        return replace(info, why=outcome.why)
     return replace(
-        info, works=True, why=found.why64, fp64=found.fp64, fast_fp64=found.fp64 and found.fast_fp64,
-        rate=found.rate, local_memory=found.local_memory, warp=info.warp or found.warp,
+        info, works=True, why=outcome.why64, fp64=outcome.fp64, fast_fp64=outcome.fp64 and outcome.fast_fp64,
+        rate=outcome.rate, local_memory=outcome.local_memory, warp=info.warp or outcome.warp,
     )  # fmt: skip
 
 

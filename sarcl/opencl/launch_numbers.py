@@ -22,21 +22,21 @@ def launch_numbers(file: str, kernel: str, **values: ArrayLike) -> np.ndarray:
     """
     layout = struct_layout(file, f"{kernel}_numbers")
     names = layout.names or ()
-    given = tuple(values[name] for name in names if name in values)
-    if len(given) != len(names) or len(values) != len(names):
+    row = tuple(values[name] for name in names if name in values)
+    if len(row) != len(names) or len(values) != len(names):
         missing, unknown = set(names) - values.keys(), values.keys() - set(names)
         raise TypeError(f"{kernel}_numbers of {file}: missing {sorted(missing)}, unknown {sorted(unknown)}")
-    return np.array([given], layout)
+    return np.array([row], layout)
 
 
 @functools.cache
 def struct_layout(file: str, struct: str) -> np.dtype:
     """Types and places of the members of a struct in a kernel's source text, as C lays them out."""
-    found = re.search(r"typedef struct \{([^}]*)\} " + struct + ";", re.sub(r"//.*", "", source(file)))
-    if found is None:
+    definition = re.search(r"typedef struct \{([^}]*)\} " + struct + ";", re.sub(r"//.*", "", source(file)))
+    if definition is None:
         raise TypeError(f"kernels/{file} has no `typedef struct {{ ... }} {struct};`")
     members: list[tuple[str, type, tuple[int, ...]]] = []
-    for line in filter(str.strip, found[1].split(";")):
+    for line in filter(str.strip, definition[1].split(";")):
         kind, names = line.strip().split(" ", 1)
         for name in names.split(","):
             at = re.fullmatch(r"\s*(\w+)(?:\[(\d+)\])?\s*", name)

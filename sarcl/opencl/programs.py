@@ -87,15 +87,15 @@ def kernels_of(program: Any) -> dict[str, Any]:
     """The kernels of a built program by their names."""
     import pyopencl
 
-    found = {kernel.function_name: kernel for kernel in program.all_kernels()}
-    if not found:
+    kernels = {kernel.function_name: kernel for kernel in program.all_kernels()}
+    if not kernels:
         platform = program.get_info(pyopencl.program_info.DEVICES)[0].platform.name
         where = "POCL_CACHE_DIR or ~/.cache/pocl" if platform == POCL else "its own folder"
         raise RuntimeError(
             f"{platform} built a program without kernels: its cache of built programs, in {where}, may be damaged; "
             "delete that folder"
         )
-    return found
+    return kernels
 
 
 @contextmanager

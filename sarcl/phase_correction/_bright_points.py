@@ -47,9 +47,9 @@ def in_pulses(raw: PhaseHistory) -> np.ndarray:
         rows[place] = row
     if (rows < 0).any():
         pulse_at, channel_at = (int(i) for i in np.argwhere(rows < 0)[0])
-        there = rows[:, channel_at].max()
+        present_row = rows[:, channel_at].max()
         names = {"tx_channel": raw.tx_channel, "rx_channel": raw.rx_channel, "polarization": raw.polarization}
-        lacking = ", ".join(f"{k} {v[there]}" for k, v in names.items() if v is not None)
+        lacking = ", ".join(f"{k} {v[present_row]}" for k, v in names.items() if v is not None)
         raise ValueError(
             f"pulse {pulse_at} has no row of {lacking}, other pulses have; autofocus estimates one phase per pulse "
             "from all its channels: choose rows that every pulse has, with raw.select(...)"

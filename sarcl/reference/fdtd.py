@@ -55,13 +55,13 @@ def _across(curl: np.ndarray, at: np.ndarray, weight: np.ndarray) -> np.ndarray:
     added = np.zeros(len(at))
     component, *node = np.unravel_index(at, curl.shape)
     for a, b, c in CYCLIC:
-        some = component == a
-        cell = [x[some] for x in node]
+        of_component = component == a
+        cell = [x[of_component] for x in node]
         for along, first in ((b, 0), (c, 2)):
             for ahead in (0, 1):
                 for side in (0, 1):
                     place = (x + (n == a) * ahead - (n == along) * side for n, x in enumerate(cell))
-                    added[some] += weight[first + ahead][some] * curl[(along, *place)]
+                    added[of_component] += weight[first + ahead][of_component] * curl[(along, *place)]
     return added
 
 

@@ -113,9 +113,9 @@ class Builder:
         table = getattr(self.scenario, section)
         if table is None:
             return track
-        ((kind, given),) = table.items()
-        given = earth_fixed(self.place(), given)
-        return self.call((section, kind), given, partial(_schema.calls(section)[kind], track))
+        ((kind, values),) = table.items()
+        values = earth_fixed(self.place(), values)
+        return self.call((section, kind), values, partial(_schema.calls(section)[kind], track))
 
     def _check_local(self, kind: str, section: str) -> None:
         """ValueError for a track in local coordinates where [place] makes the scene Earth-fixed."""
@@ -137,22 +137,22 @@ class Builder:
     def one(self, name: str) -> Any:
         """The object that a section describes in one table."""
         table = self.section(name)
-        known = _schema.calls(name)
+        calls = _schema.calls(name)
         kind = next(iter(table))
-        if kind in known:
-            return self.call((name, kind), table[kind], known[kind])
-        return self.call((name,), table, known[""])
+        if kind in calls:
+            return self.call((name, kind), table[kind], calls[kind])
+        return self.call((name,), table, calls[""])
 
     def call(self, path: _schema.Path, table: Mapping[str, Any], call: _schema.Call) -> Any:
         """call(**table), with files relative to the scenario's folder; messages name file, line and table."""
         renamed = {new: old for old, new in _schema.RENAMED.items() if old in inspect.signature(call).parameters}
         with self.scenario.where.blame(path, table):
-            given = {renamed.get(k, k): _argument(k, v) for k, v in table.items()}
+            arguments = {renamed.get(k, k): _argument(k, v) for k, v in table.items()}
             for name in ("mesh", "path", "dem", "geoid"):
-                if isinstance(given.get(name), str):
-                    given[name] = self.scenario.folder / given[name]
+                if isinstance(arguments.get(name), str):
+                    arguments[name] = self.scenario.folder / arguments[name]
             left_out = [p.name for p in inspect.signature(call).parameters.values() if _schema.may_be_left_out(p)]
-            return call(**{**dict.fromkeys(left_out), **given})
+            return call(**{**dict.fromkeys(left_out), **arguments})
 
     def options(self, name: str, options: Mapping[str, Any]) -> dict[str, Any]:
         """Arguments of a function. A list is a pair, or a name with its parameters: a tuple in Python."""

@@ -25,9 +25,9 @@ def image_text(scenario: Scenario) -> str:
     """The function that makes the image, and its grid, in words."""
     section = section_of(scenario)
     if not scenario.needs_grid:
-        given = _range_doppler_options(scenario, {})
-        told = ", ".join(f"{k} {v:g}" if isinstance(v, float) else f"{k} {v}" for k, v in given.items())
-        return f"range_doppler, {told}" if told else "range_doppler"
+        arguments = _range_doppler_options(scenario, {})
+        words = ", ".join(f"{k} {v:g}" if isinstance(v, float) else f"{k} {v}" for k, v in arguments.items())
+        return f"range_doppler, {words}" if words else "range_doppler"
     if scenario.grid is None:
         return f"{section}, on a grid chosen from the echoes"
     return f"{section}, {' x '.join(map(str, scenario.build_grid().shape))} pixels"
@@ -50,20 +50,20 @@ def call_of(scenario: Scenario, raw: PhaseHistory, grid: ImageGrid | None, optio
 
 def _range_doppler_options(scenario: Scenario, options: Mapping[str, Any]) -> dict[str, Any]:
     """Arguments of range_doppler; with [place], its height and its side of the orbit's track are the defaults."""
-    given = Builder(scenario).options("range_doppler", options)
-    heights = given.get("heights")
+    arguments = Builder(scenario).options("range_doppler", options)
+    heights = arguments.get("heights")
     if isinstance(heights, (str, Mapping)):
         from ..earth.elevation import ElevationModel
 
         table = {"file": heights} if isinstance(heights, str) else heights
-        given["heights"] = Builder(scenario).call(("range_doppler", "heights"), table, ElevationModel.read)
+        arguments["heights"] = Builder(scenario).call(("range_doppler", "heights"), table, ElevationModel.read)
     place = scenario.build_place()
     if place is not None:
-        given.setdefault("heights", place.height)
-        if scenario.orbit is not None and given.get("side") is None:
+        arguments.setdefault("heights", place.height)
+        if scenario.orbit is not None and arguments.get("side") is None:
             orbit = scenario.build_orbit()
-            given["side"] = side_of(orbit, place, time_over(orbit, place))
-    return given
+            arguments["side"] = side_of(orbit, place, time_over(orbit, place))
+    return arguments
 
 
 def check_window(scenario: Scenario) -> None:
@@ -71,6 +71,6 @@ def check_window(scenario: Scenario) -> None:
     from ..numerics.windows import check
 
     section = section_of(scenario)
-    given = Builder(scenario).options(section, {})
-    with scenario.where.blame((section,), given, always=False):
-        check(given.get("window"))
+    arguments = Builder(scenario).options(section, {})
+    with scenario.where.blame((section,), arguments, always=False):
+        check(arguments.get("window"))

@@ -220,9 +220,9 @@ def _check_table(
 
             _check_table((*path, key), value, ElevationModel.read, where)
             continue
-        wanted = _wanted(known[key], value, key)
-        if wanted:
-            raise ValueError(f"{where.text(path, key)} {key} is {_shown(value)}, wanted {wanted}")
+        type_text = _wanted(known[key], value, key)
+        if type_text:
+            raise ValueError(f"{where.text(path, key)} {key} is {_shown(value)}, wanted {type_text}")
     for key, parameter in known.items():
         if parameter.default is inspect.Parameter.empty and key not in table:
             needed = [k for k, p in known.items() if p.default is inspect.Parameter.empty]

@@ -76,30 +76,30 @@ def shown(name: str, value: ArrayLike | None) -> str:
     return f"{number} {unit}".strip()
 
 
-def _list(name: str, given: Any) -> list[Any]:
+def _list(name: str, values: Any) -> list[Any]:
     if name not in KEYS:
         raise ValueError(text.unknown(name, list(KEYS), "key"))
-    if name == "bandwidth" and np.ndim(given) == 0:
-        given = [given]
-    if isinstance(given, str) or not isinstance(given, (Sequence, np.ndarray)):
-        raise ValueError(f"{name} is {given!r:.60}; a sweep wants a list of values")
-    if len(given) == 0:
+    if name == "bandwidth" and np.ndim(values) == 0:
+        values = [values]
+    if isinstance(values, str) or not isinstance(values, (Sequence, np.ndarray)):
+        raise ValueError(f"{name} is {values!r:.60}; a sweep wants a list of values")
+    if len(values) == 0:
         raise ValueError(f"{name} has no values to sweep; give at least one, or leave it out")
-    plain = [value.item() if isinstance(value, np.generic) else value for value in given]
+    plain = [value.item() if isinstance(value, np.generic) else value for value in values]
     return [tuple(value) if isinstance(value, (list, tuple, np.ndarray)) else value for value in plain]
 
 
-def _whole(fields: Mapping[str, Any], given: dict[str, Any]) -> dict[str, Any]:
+def _whole(fields: Mapping[str, Any], combination: dict[str, Any]) -> dict[str, Any]:
     """The fields set by one combination, with bandwidth replaced by n and frequency_step."""
-    if "bandwidth" not in given:
-        return given
-    given = dict(given)
-    band = validation.number("bandwidth", given.pop("bandwidth"), above=0)
-    fields_in_force = {"progression": Case.progression, "frequency_step": Case.frequency_step, **fields, **given}
+    if "bandwidth" not in combination:
+        return combination
+    combination = dict(combination)
+    band = validation.number("bandwidth", combination.pop("bandwidth"), above=0)
+    fields_in_force = {"progression": Case.progression, "frequency_step": Case.frequency_step, **fields, **combination}
     if fields_in_force["progression"] == "planar":
         raise ValueError("bandwidth is kept for one row of elements; give a planar array's n and frequency_step")
-    if "n" in given:
-        return {**given, "frequency_step": band / validation.count("n", given["n"], 2)}
+    if "n" in combination:
+        return {**combination, "frequency_step": band / validation.count("n", combination["n"], 2)}
     step = validation.number("frequency_step", fields_in_force["frequency_step"])
     n = band / abs(step) if step else 0.0
     if n < 1.5 or abs(n - round(n)) > 1e-6:
@@ -107,4 +107,4 @@ def _whole(fields: Mapping[str, Any], given: dict[str, Any]) -> dict[str, Any]:
             f"bandwidth is {band:g} Hz and frequency_step {step:g} Hz: {n:.4g} elements; give a step of which the "
             "band is a whole multiple, at least twice"
         )
-    return {**given, "n": round(n)}
+    return {**combination, "n": round(n)}

@@ -85,17 +85,17 @@ def _plots(cases: Sequence[Result]) -> list[html.Block]:
         rest = ", ".join(f"{k} {shown(k, v)}" for k, v in case["swept"].items() if k != key)
         others.setdefault(rest, []).append(case)
     out = []
-    for rest, some in others.items():
+    for rest, group in others.items():
         for title, _, value in QUANTITIES:
             curves = []
-            for name in _names(some):
-                found = sorted(
+            for name in _names(group):
+                pairs = sorted(
                     (scale * case["swept"][key], v)
-                    for case in some
+                    for case in group
                     if name in case["mapped"] and (v := value(case["mapped"][name])) is not None
                 )
-                x, y = zip(*found, strict=True) if found else ((), ())
-                curves.append((name if found else f"({name}: none)", x, y))
+                x, y = zip(*pairs, strict=True) if pairs else ((), ())
+                curves.append((name if pairs else f"({name}: none)", x, y))
             if any(len(x) for _, x, _ in curves):
                 out.append(html.plot(curves, axis, title, f"{title}{'; ' if rest else ''}{rest}", log_x=many))
     return out

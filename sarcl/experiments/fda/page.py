@@ -101,8 +101,8 @@ def _caption_of_dips(rows: Mapping[str, Any]) -> str:
         name: [f"{d['separation']:g}" for d in row["dips"] if d["dip_db"] >= RESOLVED and not d["resolved"]]
         for name, row in rows.items()
     }
-    some = "; ".join(f"{name} at {', '.join(at)} m" for name, at in deep.items() if at)
-    return f"{text} Not resolved in spite of their dip: {some}." if some else text
+    unresolved = "; ".join(f"{name} at {', '.join(at)} m" for name, at in deep.items() if at)
+    return f"{text} Not resolved in spite of their dip: {unresolved}." if unresolved else text
 
 
 def _supports(result: Result) -> list[Block]:

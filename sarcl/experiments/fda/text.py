@@ -28,24 +28,24 @@ def rule(null: float | None = None) -> str:
     )
 
 
-def unresolved(found: Pair, null: float) -> list[str]:
+def unresolved(two: Pair, null: float) -> list[str]:
     """Every reason why a pair of points (`fda.pair`) is not resolved, in words; empty where it is.
 
     null: of the conventional antenna, m
     """
-    count = f"{len(found['peaks'])} peak{'s' if len(found['peaks']) > 1 else ''}"
-    where = f"{count} within {RESOLVED:g} dB for 2 points, at {', '.join(f'{x:+.3f}' for x in found['peaks'])} m"
-    if found["shift"] is None or found["false_db"] is None:
-        return [where if len(found["peaks"]) > 1 else "1 peak for 2 points"]
+    count = f"{len(two['peaks'])} peak{'s' if len(two['peaks']) > 1 else ''}"
+    where = f"{count} within {RESOLVED:g} dB for 2 points, at {', '.join(f'{x:+.3f}' for x in two['peaks'])} m"
+    if two["shift"] is None or two["false_db"] is None:
+        return [where if len(two["peaks"]) > 1 else "1 peak for 2 points"]
     out = []
-    if found["dip_db"] < RESOLVED:
-        out.append(f"the dip is {found['dip_db']:.1f} dB ({RESOLVED:g} dB are needed)")
-    if found["shift"] > NEAR * null:
-        out.append(f"a peak is displaced by {found['shift']:.3f} m ({NEAR * null:.3f} m are allowed)")
-    if found["false_db"] > -RESOLVED:
-        out.append(f"another peak reaches {decibels(found['false_db'])} of the lower of the two: {where}")
-    if found["level_db"] < WEAK:
-        out.append(f"the lower peak is at {decibels(found['level_db'])} ({WEAK:g} dB are needed)")
+    if two["dip_db"] < RESOLVED:
+        out.append(f"the dip is {two['dip_db']:.1f} dB ({RESOLVED:g} dB are needed)")
+    if two["shift"] > NEAR * null:
+        out.append(f"a peak is displaced by {two['shift']:.3f} m ({NEAR * null:.3f} m are allowed)")
+    if two["false_db"] > -RESOLVED:
+        out.append(f"another peak reaches {decibels(two['false_db'])} of the lower of the two: {where}")
+    if two["level_db"] < WEAK:
+        out.append(f"the lower peak is at {decibels(two['level_db'])} ({WEAK:g} dB are needed)")
     return out
 
 
@@ -58,16 +58,16 @@ def conclusion(results: Sequence[Mapping[str, Any]]) -> list[str]:
             lines.append(f"{name}: applies to none of the {_cases(len(results))}.")
             continue
         rows, plain = ([case["mapped"][who] for case in cases] for who in (name, CONVENTIONAL))
-        found = [nearer(row, usual, case["null"]) for row, usual, case in zip(rows, plain, cases, strict=True)]
-        if found.count(1):
-            better.append(f"{name} in {found.count(1)} of {_cases(len(cases))}")
-        some = "" if len(cases) == len(results) else f" (applies to {len(cases)} of {_cases(len(results))})"
+        ranks = [nearer(row, usual, case["null"]) for row, usual, case in zip(rows, plain, cases, strict=True)]
+        if ranks.count(1):
+            better.append(f"{name} in {ranks.count(1)} of {_cases(len(cases))}")
+        share = "" if len(cases) == len(results) else f" (applies to {len(cases)} of {_cases(len(results))})"
         nulls, usual = _extremes(rows, "null", ".4f"), _extremes(plain, "null", ".4f")
         lobes, normal = _extremes(rows, "pslr_db", ".1f"), _extremes(plain, "pslr_db", ".1f")
-        neither = f", with neither in {found.count(None)}" if None in found else ""
+        neither = f", with neither in {ranks.count(None)}" if None in ranks else ""
         lines.append(
-            f"{name}{some}: two points resolved closer together in {found.count(1)} of {_cases(len(cases))}, equally "
-            f"close in {found.count(0)}, only farther apart or not at all in {found.count(-1)}{neither}. Null of the "
+            f"{name}{share}: two points resolved closer together in {ranks.count(1)} of {_cases(len(cases))}, equally "
+            f"close in {ranks.count(0)}, only farther apart or not at all in {ranks.count(-1)}{neither}. Null of the "
             f"first point {nulls} m (conventional {usual}), highest side lobe {lobes} dB (conventional {normal}), "
             f"points displaced by at most {at_most(max(worst(row) for row in rows))} m."
         )
@@ -97,10 +97,10 @@ def _cases(n: int) -> str:
 
 def _extremes(rows: Sequence[Mapping[str, Any]], key: str, form: str) -> str:
     """Smallest to largest value of the first points that have a peak on their cut."""
-    found = [row["points"][0][key] for row in rows if row["points"][0]["inside"]]
-    if not found:
+    values = [row["points"][0][key] for row in rows if row["points"][0]["inside"]]
+    if not values:
         return "nowhere"
-    ends = [f"{v + 0.0:{form}}" for v in (min(found), max(found))]
+    ends = [f"{v + 0.0:{form}}" for v in (min(values), max(values))]
     return ends[0] if ends[0] == ends[1] else " to ".join(ends)
 
 
@@ -226,12 +226,12 @@ def _apart(row: Mapping[str, Any]) -> str:
 
 def _spoiled(row: Mapping[str, Any], null: float) -> str:
     """Reasons why a dip of enough decibels does not resolve two points: all, of the first such dip."""
-    for found in row["dips"]:
-        counted = row["told_apart"] is not None and found["separation"] >= row["told_apart"]
-        if found["dip_db"] < RESOLVED or counted:
+    for dip in row["dips"]:
+        counted = row["told_apart"] is not None and dip["separation"] >= row["told_apart"]
+        if dip["dip_db"] < RESOLVED or counted:
             continue
         why = ["the points are not resolved at a larger separation"]
-        if not is_resolved(found, null):
-            why = unresolved(found, null)
-        return f" At {found['separation']:g} m there is a dip of {found['dip_db']:.1f} dB, but {'; '.join(why)}."
+        if not is_resolved(dip, null):
+            why = unresolved(dip, null)
+        return f" At {dip['separation']:g} m there is a dip of {dip['dip_db']:.1f} dB, but {'; '.join(why)}."
     return ""

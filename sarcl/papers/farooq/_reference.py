@@ -49,8 +49,8 @@ def _shapes(out: Section, curves: dict[str, dict[str, tuple[np.ndarray, np.ndarr
     for name, law in (("LFM", "sinc"), ("tone", "triangular")):
         places, values = curves["range"][name]
         x = places / cell
-        wanted = np.abs(np.sinc(x)) if law == "sinc" else np.maximum(1 - np.abs(x), 0)
-        off = float(np.abs(values / values.max() - wanted).max())
+        law_values = np.abs(np.sinc(x)) if law == "sinc" else np.maximum(1 - np.abs(x), 0)
+        off = float(np.abs(values / values.max() - law_values).max())
         out.states("{name}: shape of the range response", off, off < 0.05, expected=law, name=name, law=law)
     chirp = curves["cross-range"]["LFM"][1]
     tone = curves["cross-range"]["tone"][1]

@@ -61,8 +61,8 @@ def _edges(
         first, last = crossings(profile, places, lit / 2)
         cell = FINE.null[1] * scale
         out.words = {"plane": plane}
-        for name, wanted, found in (("begins", ends[0], first), ("ends", ends[1], last)):
-            out.number("shadow {name}, {plane} range", found, expected=wanted * scale, within=0.5 * cell, name=name)
+        for name, wanted, edge in (("begins", ends[0], first), ("ends", ends[1], last)):
+            out.number("shadow {name}, {plane} range", edge, expected=wanted * scale, within=0.5 * cell, name=name)
         run = (ends[1] - ends[0]) * scale
         out.number("length of the dark run, {plane} range", last - first, expected=run, within=0.7 * cell)
         if plane == "ground":
@@ -127,8 +127,8 @@ def composite(lab: Lab) -> Section:
     profile = mean[0][np.abs(y + 12) < 4].mean(axis=0)
     end = -7 + 20 * TANGENT  # the shadow of the rear edge of the parallelepiped, 20 m high
     lit = profile[(x > end + 4) & (x < 44)].mean()
-    found = crossings(profile, x, lit / 2)[1]
-    out.number("end of the parallelepiped's shadow", found, expected=end, within=RADAR.null[1])
+    edge = crossings(profile, x, lit / 2)[1]
+    out.number("end of the parallelepiped's shadow", edge, expected=end, within=RADAR.null[1])
     return out
 
 

@@ -69,9 +69,9 @@ def section(lab: Lab) -> Section:
 def azimuths(n_pulses: int, anchors: np.ndarray) -> np.ndarray:
     """Numbers of N_AZIMUTHS pulses over the whole track, in pairs about the middle; none is an anchor."""
     half = np.linspace(0, (n_pulses - 1) / 2, N_AZIMUTHS + 1)[1::2]
-    taken = set(np.concatenate([anchors, n_pulses - 1 - anchors]).tolist())
+    excluded = set(np.concatenate([anchors, n_pulses - 1 - anchors]).tolist())
     rows = [
-        next(r for r in (*range(row, -1, -1), *range(row, n_pulses)) if r not in taken)
+        next(r for r in (*range(row, -1, -1), *range(row, n_pulses)) if r not in excluded)
         for row in half.astype(int).tolist()
     ]
     return np.unique(np.concatenate([rows, n_pulses - 1 - np.array(rows)]))
@@ -85,15 +85,15 @@ def compared(lab: Lab, name: str) -> Comparison:
     pulses = np.union1d(rows, [n // 2])
     middle = int(np.searchsorted(pulses, n // 2))
     picked, seconds, echoes = track.picked(pulses), [], []
-    for kept, anchors in (("azimuths", list(range(len(pulses)))), ("one", [middle])):
-        made = lab.run(name, picked, "HH", kept, anchors=anchors, model_error=False)
-        seconds.append(sum(report_of(made)[0].seconds.values()))
-        echoes.append(np.delete(made.read(0, made.n_rows), middle, axis=0))
+    for label, anchors in (("azimuths", list(range(len(pulses)))), ("one", [middle])):
+        run = lab.run(name, picked, "HH", label, anchors=anchors, model_error=False)
+        seconds.append(sum(report_of(run)[0].seconds.values()))
+        echoes.append(np.delete(run.read(0, run.n_rows), middle, axis=0))
     exact, own = echoes[0], raw.read(0, n)[rows]
     norm = np.linalg.norm(exact, axis=1)
     total = float(np.linalg.norm(norm))
     positions = track.positions[rows]
-    errors = [np.linalg.norm(made - exact, axis=1) for made in (echoes[1], own)]
+    errors = [np.linalg.norm(run - exact, axis=1) for run in (echoes[1], own)]
     return Comparison(
         np.arctan2(positions[:, 1], np.hypot(positions[:, 0], positions[:, 2])),
         errors[0] / norm,
