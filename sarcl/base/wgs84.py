@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from . import validation
+from .vectors import Floats
 
 SEMI_MAJOR = 6_378_137.0  # m, defining
 FLATTENING = 1 / 298.257223563  # defining
@@ -15,13 +16,13 @@ ECCENTRICITY_SQUARED = FLATTENING * (2 - FLATTENING)
 ANTENNAS = 6.3e6, 5e7  # m: antennas at such distances from the origin are in Earth-fixed coordinates
 
 
-def is_earth_fixed(antenna: NDArray[np.float64]) -> bool:
+def is_earth_fixed(antenna: Floats) -> bool:
     """Whether the position of an antenna, m (3,), is Earth-fixed: told by its distance from the origin."""
     position = validation.array("antenna", antenna, np.float64, (3,))
     return ANTENNAS[0] < float(np.hypot(np.hypot(*position[:2]), position[2])) < ANTENNAS[1]
 
 
-def ecef(longitude: ArrayLike, latitude: ArrayLike, height: ArrayLike) -> NDArray[np.float64]:
+def ecef(longitude: ArrayLike, latitude: ArrayLike, height: ArrayLike) -> Floats:
     """Earth-centred, Earth-fixed positions, m (..., 3), of degrees and heights above the ellipsoid, m.
 
     Source: NGA.STND.0036 (WGS84), eq. (4-14): x = (N + h) cos(lat) cos(lon), ..., z = (N (1 - e^2) + h) sin(lat).
@@ -37,7 +38,7 @@ def ecef(longitude: ArrayLike, latitude: ArrayLike, height: ArrayLike) -> NDArra
     )
 
 
-def up(longitude: ArrayLike, latitude: ArrayLike) -> NDArray[np.float64]:
+def up(longitude: ArrayLike, latitude: ArrayLike) -> Floats:
     """Unit normal of the ellipsoid, outwards (..., 3), at degrees."""
     longitude, latitude = _radians(longitude, latitude)
     with np.errstate(invalid="ignore"):  # infinite angles have no normal: NaN, as of NaN
@@ -45,7 +46,7 @@ def up(longitude: ArrayLike, latitude: ArrayLike) -> NDArray[np.float64]:
         return np.stack(np.broadcast_arrays(c * np.cos(longitude), c * np.sin(longitude), np.sin(latitude)), axis=-1)
 
 
-def local_axes(longitude: float, latitude: float) -> NDArray[np.float64]:
+def local_axes(longitude: float, latitude: float) -> Floats:
     """Rows east, north, up (3, 3) in Earth-centred coordinates: local = axes @ (position - origin)."""
     lon, lat = (
         np.radians(validation.number("longitude", longitude)),
@@ -68,7 +69,7 @@ def vertical_at(position: np.ndarray) -> np.ndarray | None:
     return np.asarray(normal / np.linalg.norm(normal))
 
 
-def geodetic(positions: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def geodetic(positions: ArrayLike) -> tuple[Floats, Floats, Floats]:
     """Longitude, latitude, degrees, and height above the ellipsoid, m, each (...), of positions, m (..., 3).
 
     The inverse of `ecef`, in closed form, at any distance from the centre: heights to 1e-9 m near the Earth, angles to
@@ -106,6 +107,6 @@ def geodetic(positions: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.floa
     return np.degrees(np.arctan2(y, x)), latitude, height.astype(np.float64)
 
 
-def _radians(longitude: ArrayLike, latitude: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _radians(longitude: ArrayLike, latitude: ArrayLike) -> tuple[Floats, Floats]:
     """Degrees as radians in float64: in float32, as files hold them, sines are off by half a metre on the ground."""
     return np.radians(validation.values("longitude", longitude)), np.radians(validation.values("latitude", latitude))

@@ -10,9 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..base import wgs84
+from ..base.vectors import Floats
 
 ITERATIONS = 30
 FOUND = 1e-6  # step of the iteration, in cells, at which a position is found; others lie outside the grid
@@ -20,18 +20,17 @@ SAME = 1.2e-13  # degrees, 1.3e-8 m, twice the rounding of longitudes up to 360:
 ANTIPODE = -1 + 1e-9  # cosine of the angle from the middle: beyond, stereographic coordinates are set to 1e6
 POLAR = 80.0  # degrees of latitude
 BLOCK = 2**20  # points of a grid that are projected at once
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class Axes:
     """A grid of meridians, degrees (n_columns,), and parallels (n_rows,), both monotonic, in either direction."""
 
-    longitude: Array
-    latitude: Array
+    longitude: Floats
+    latitude: Floats
 
     @classmethod
-    def of(cls, longitude: Array, latitude: Array) -> Axes | None:
+    def of(cls, longitude: Floats, latitude: Floats) -> Axes | None:
         """The axes of longitudes and latitudes (n_rows, n_columns), or None for a grid of other lines.
 
         ValueError for axes that go back, or jump over the antimeridian.
@@ -60,7 +59,7 @@ class Axes:
         step = float(np.diff(self.longitude).mean())
         return abs(abs(self.longitude[-1] + step - self.longitude[0]) - 360) < 1e-3 * abs(step)
 
-    def at(self, longitude: Array, latitude: Array) -> Array:
+    def at(self, longitude: Floats, latitude: Floats) -> Floats:
         """Fractional (row, column) (2, n) of degrees (n,); beyond the ends outside the grid."""
         axis = self.longitude
         if self.is_around:
@@ -69,7 +68,7 @@ class Axes:
         return np.stack([_place(self.latitude, latitude), _place(axis, longitude - 360 * turns)])
 
 
-def _place(axis: Array, values: Array) -> Array:
+def _place(axis: Floats, values: Floats) -> Floats:
     """Fractional indices (n,) of values in a monotonic axis, by linear inter- and extrapolation; whole ones of its
     own values."""
     if axis[-1] < axis[0]:
@@ -92,12 +91,12 @@ class Curvilinear:
 
     is_polar: bool
     middle: float
-    axes: Array
-    points: Array
-    affine: Array
+    axes: Floats
+    points: Floats
+    affine: Floats
 
     @classmethod
-    def of(cls, longitude: Array, latitude: Array) -> Curvilinear:
+    def of(cls, longitude: Floats, latitude: Floats) -> Curvilinear:
         """ValueError for a grid that is folded, or has empty cells."""
         i, j = (n // 2 for n in longitude.shape)
         middle = float(longitude[i, j])
@@ -124,7 +123,7 @@ class Curvilinear:
         affine = np.linalg.lstsq(coordinates, corner.astype(np.float64), rcond=None)[0].T
         return cls(is_polar, middle, axes, points, affine)
 
-    def at(self, longitude: Array, latitude: Array) -> Array:
+    def at(self, longitude: Floats, latitude: Floats) -> Floats:
         """Fractional (row, column) (2, n) of degrees (n,), whole at the points; NaN where there is none."""
         target = _coordinates(self.is_polar, self.middle, self.axes, longitude, latitude)
         size = np.array(self.points.shape[1:])[:, None]
@@ -156,12 +155,12 @@ def _blocks(shape: tuple[int, ...]) -> list[slice]:
     return [slice(first, min(first + count, shape[0])) for first in range(0, shape[0], count)]
 
 
-def _around(longitude: Array, middle: float) -> Array:
+def _around(longitude: Floats, middle: float) -> Floats:
     """Longitudes from a middle one, from -180 to 180 degrees."""
     return np.asarray((longitude - middle + 180) % 360 - 180)
 
 
-def _coordinates(is_polar: bool, middle: float, axes: Array, longitude: Array, latitude: Array) -> Array:
+def _coordinates(is_polar: bool, middle: float, axes: Floats, longitude: Floats, latitude: Floats) -> Floats:
     """Coordinates (2, ...) of degrees (...): as `Curvilinear` has them."""
     if not is_polar:
         return np.stack([_around(longitude, middle), latitude])

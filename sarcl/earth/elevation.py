@@ -10,10 +10,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..base import validation, wgs84
 from ..base.types import PathLike
+from ..base.vectors import Floats
 from ..io import elevation
 from ..io.elevation import Geoid
 from ._grid_index import Axes, Curvilinear
@@ -36,9 +37,9 @@ class ElevationModel:
     NaN, or beyond +-20 km. `read` takes files.
     """
 
-    longitude: NDArray[np.float64]
-    latitude: NDArray[np.float64]
-    height: NDArray[np.float64]
+    longitude: Floats
+    latitude: Floats
+    height: Floats
 
     if TYPE_CHECKING:  # types of the arguments; the fields above have the types after conversion
 
@@ -100,7 +101,7 @@ class ElevationModel:
         lines = [wgs84.ecef(self.longitude[at], self.latitude[at], 0.0) for at in (np.s_[i, :], np.s_[:, j])]
         return float(min(np.linalg.norm(np.diff(line, axis=0), axis=1).min() for line in lines))
 
-    def heights_at(self, longitude: ArrayLike, latitude: ArrayLike) -> NDArray[np.float64]:
+    def heights_at(self, longitude: ArrayLike, latitude: ArrayLike) -> Floats:
         """Heights above the ellipsoid, m (...), at degrees (...); NaN outside the grid and in cells without data."""
         lon, lat = validation.values("longitude", longitude), validation.values("latitude", latitude)
         try:
@@ -120,7 +121,7 @@ class ElevationModel:
         return np.where(is_inside, _bilinear(height, np.clip(position, 0, size)), np.nan).reshape(shape)
 
     @functools.cached_property
-    def _index(self) -> tuple[Axes | Curvilinear, NDArray[np.float64]]:
+    def _index(self) -> tuple[Axes | Curvilinear, Floats]:
         """Rows and columns by degrees, and the heights there: the first column again after the last one around the
         Earth."""
         axes = Axes.of(self.longitude, self.latitude)
@@ -130,7 +131,7 @@ class ElevationModel:
 
     def grid_positions(
         self, spacing: tuple[float, float], frame: str, center: Sequence[float] | np.ndarray | None
-    ) -> NDArray[np.float64]:
+    ) -> Floats:
         """Positions on the terrain, m (n_rows, n_columns, 3), at even steps north (row) and east (column), m.
 
         They cover the box of the model in the local frame at `center`, and are NaN where it has no heights. frame and
@@ -166,7 +167,7 @@ class ElevationModel:
         return positions @ axes + origin if frame == "ecef" else positions
 
 
-def _bilinear(values: NDArray[np.float64], at: NDArray[np.float64]) -> NDArray[np.float64]:
+def _bilinear(values: Floats, at: Floats) -> Floats:
     """A grid of values (n_rows, n_columns) at fractional (row, column) (2, n), extrapolated outside: (n,)."""
     size = np.array(values.shape)[:, None]
     low = np.clip(np.nan_to_num(np.floor(at)), 0, size - 2).astype(np.int64)  # NaN in, NaN out: by the weights

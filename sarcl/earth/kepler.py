@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..base import validation, wgs84
+from ..base.vectors import Floats
 from .rotation import GM, J2, RATE, to_earth_fixed
 
 FARTHEST = 1e11  # m: what is farther from the Earth is in no orbit about it
@@ -78,12 +78,12 @@ class KeplerElements:
         drift = factor * np.sqrt(shape) * (1 - 1.5 * s2)
         return float(-factor * np.cos(self.inclination)), float(factor * (2 - 2.5 * s2)), float(n + drift)
 
-    def at(self, times: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def at(self, times: Floats) -> tuple[Floats, Floats]:
         """Earth-fixed positions, m, and velocities, m/s (n, 3), at times, s (n,)."""
         positions, velocities = self.inertial(times)
         return to_earth_fixed(self.greenwich + RATE * times, RATE, positions, velocities)
 
-    def inertial(self, times: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def inertial(self, times: Floats) -> tuple[Floats, Floats]:
         """Inertial positions, m, and velocities, m/s (n, 3); x points to where the node is counted from."""
         a, e = self.semi_major_axis, self.eccentricity
         node_rate, perigee_rate, anomaly_rate = self.rates
@@ -97,7 +97,7 @@ class KeplerElements:
         cn, sn = np.cos(self.node + node_rate * times), np.sin(self.node + node_rate * times)
         ci, si = np.cos(self.inclination), np.sin(self.inclination)
 
-        def turned(u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
+        def turned(u: Floats, v: Floats) -> Floats:
             return np.stack([cn * u - sn * ci * v, sn * u + cn * ci * v, si * v], axis=-1)
 
         positions, velocities = turned(x, y), turned(vx, vy)
@@ -110,7 +110,7 @@ class KeplerElements:
         return f"Kepler elements {drift}, in closed form"
 
 
-def eccentric_anomaly(mean: NDArray[np.float64], eccentricity: float) -> NDArray[np.float64]:
+def eccentric_anomaly(mean: Floats, eccentricity: float) -> Floats:
     """Eccentric anomalies E, rad, of E - e sin E = M: Newton's iteration within bounds that hold the root."""
     turn = 2 * np.pi * np.round(mean / (2 * np.pi))
     m = mean - turn

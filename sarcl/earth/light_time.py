@@ -12,20 +12,17 @@ so that the half path of two antennas at D(-w tau_1) T and D(w tau_2) R is exact
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..base.constants import SPEED_OF_LIGHT
+from ..base.vectors import Floats
 from .rotation import RATE, rotated
 
 ITERATIONS = 6  # each reduces the error by a factor of c over the speed: 2e4 or more
 
 
 def antennas_in_flight(
-    positions: NDArray[np.float64],
-    velocities: NDArray[np.float64],
-    accelerations: NDArray[np.float64],
-    point: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    positions: Floats, velocities: Floats, accelerations: Floats, point: Floats
+) -> tuple[Floats, Floats, Floats, Floats]:
     """Antennas of exact paths to a point, from states when pulses are sent: m, m/s, m/s^2 (n, 3), Earth-fixed.
 
     point  m (3,), or (n, 3). Returns the transmitter's and the receiver's positions, m (n, 3), and the delays tau_1 and
@@ -43,20 +40,14 @@ def antennas_in_flight(
 
 
 def receivers(
-    positions: NDArray[np.float64],
-    velocities: NDArray[np.float64],
-    accelerations: NDArray[np.float64],
-    down: NDArray[np.float64],
-    up: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    positions: Floats, velocities: Floats, accelerations: Floats, down: Floats, up: Floats
+) -> tuple[Floats, Floats]:
     """Positions D(w tau_2) R, m, and velocities, m/s (..., 3), of receivers at delays tau_1 and tau_2, s (...)."""
     after = (down + up)[..., None]
     later = positions + after * (velocities + after / 2 * accelerations)
     return rotated(RATE * up, later), rotated(RATE * up, velocities + after * accelerations)
 
 
-def transmitters(
-    positions: NDArray[np.float64], velocities: NDArray[np.float64], down: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def transmitters(positions: Floats, velocities: Floats, down: Floats) -> tuple[Floats, Floats]:
     """Positions D(-w tau_1) T, m, and velocities, m/s (..., 3), of transmitters at delays tau_1, s (...)."""
     return rotated(-RATE * down, positions), rotated(-RATE * down, velocities)

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..base import validation, wgs84
+from ..base.vectors import Floats
 from ..io import elevation
 from ..io.elevation import Geoid
 
@@ -61,15 +61,15 @@ class Place:
         return cls(place.longitude, place.latitude, place.height + float(rise[0, 0]))
 
     @cached_property
-    def origin(self) -> NDArray[np.float64]:
+    def origin(self) -> Floats:
         """Earth-fixed position, m (3,)."""
         return wgs84.ecef(self.longitude, self.latitude, self.height)
 
     @cached_property
-    def axes(self) -> NDArray[np.float64]:
+    def axes(self) -> Floats:
         """Rows east, north, up (3, 3), Earth-fixed: a local vector v is v @ axes."""
         return wgs84.local_axes(self.longitude, self.latitude)
 
-    def positions(self, local: NDArray[np.float64]) -> NDArray[np.float64]:
+    def positions(self, local: Floats) -> Floats:
         """Earth-fixed positions, m (..., 3), of local ones: east, north, up, m (..., 3)."""
         return np.asarray(np.asarray(local, np.float64) @ self.axes + self.origin)

@@ -7,7 +7,8 @@ out, and UTC is used for UT1 (less than 0.9 s apart, 420 m along the equator): b
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from ..base.vectors import Floats
 
 GM = 3.986004418e14  # m^3/s^2, WGS84, atmosphere included (NGA.STND.0036, table 3.1)
 RATE = 7.292115e-5  # rad/s, WGS84, in an inertial frame (NGA.STND.0036, table 3.1)
@@ -26,22 +27,20 @@ def sidereal_time(date: np.datetime64) -> float:
     return float(2 * np.pi * (seconds % DAY) / DAY)
 
 
-def rotated(angle: NDArray[np.float64], vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+def rotated(angle: Floats, vectors: Floats) -> Floats:
     """Vectors (..., 3) turned about z by angles, rad (...), from x towards y."""
     c, s = np.cos(angle), np.sin(angle)
     x, y, z = np.moveaxis(vectors, -1, 0)
     return np.stack(np.broadcast_arrays(c * x - s * y, s * x + c * y, z), axis=-1)
 
 
-def spin(positions: NDArray[np.float64], rate: float = RATE) -> NDArray[np.float64]:
+def spin(positions: Floats, rate: float = RATE) -> Floats:
     """Velocities, m/s (..., 3), at which the Earth's rotation moves Earth-fixed positions, m (..., 3)."""
     x, y, z = np.moveaxis(positions, -1, 0)
     return np.stack([-rate * y, rate * x, np.zeros_like(z)], axis=-1)
 
 
-def to_earth_fixed(
-    greenwich: NDArray[np.float64], rate: float, positions: NDArray[np.float64], velocities: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def to_earth_fixed(greenwich: Floats, rate: float, positions: Floats, velocities: Floats) -> tuple[Floats, Floats]:
     """Earth-fixed positions, m, and velocities, m/s (n, 3), of inertial ones.
 
     greenwich  angle from the inertial x axis to the Greenwich meridian, rad (n,);  rate  its derivative, rad/s

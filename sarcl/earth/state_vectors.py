@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base import wgs84
+from ..base.vectors import Floats
 from .rotation import GM, spin
 
 LEAST_STATES = 4
@@ -35,17 +36,15 @@ class StateVectors:
                  the spacing, which no error between the states exceeds
     """
 
-    times: NDArray[np.float64]
-    positions: NDArray[np.float64]
-    velocities: NDArray[np.float64]
+    times: Floats
+    positions: Floats
+    velocities: Floats
     n_nodes: int
     hermite: bool
     left_out: float
 
     @classmethod
-    def fitted(
-        cls, times: NDArray[np.float64], positions: NDArray[np.float64], velocities: NDArray[np.float64] | None
-    ) -> StateVectors:
+    def fitted(cls, times: Floats, positions: Floats, velocities: Floats | None) -> StateVectors:
         """The states with the interpolation that predicts each of them best from the others.
 
         velocities  None: the derivatives of Lagrange polynomials through the positions
@@ -75,7 +74,7 @@ class StateVectors:
         _check_fall(times, positions, velocities)
         return cls(times, positions, velocities, n, hermite, error)
 
-    def at(self, times: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def at(self, times: Floats) -> tuple[Floats, Floats]:
         """Positions, m, and velocities, m/s (n, 3), at times, s (n,), within those of the states."""
         positions, velocities = np.empty((len(times), 3)), np.empty((len(times), 3))
         before = np.searchsorted(self.times, times, side="right") - 1
@@ -99,12 +98,7 @@ class StateVectors:
         )
 
 
-def interpolate(
-    nodes: NDArray[np.float64],
-    positions: NDArray[np.float64],
-    velocities: NDArray[np.float64] | None,
-    times: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def interpolate(nodes: Floats, positions: Floats, velocities: Floats | None, times: Floats) -> tuple[Floats, Floats]:
     """Positions, m, and their derivatives, m/s (n, 3), at times, s (n,), each from nodes of its own.
 
     nodes, positions, velocities   s (n, m), m and m/s (n, m, 3); without velocities: Lagrange, else Hermite
@@ -128,13 +122,11 @@ def interpolate(
     return out, rate
 
 
-def _sum(weights: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _sum(weights: Floats, values: Floats) -> Floats:
     return np.asarray(np.einsum("nm,nmk->nk", weights, values))
 
 
-def _leave_one_out(
-    times: NDArray[np.float64], positions: NDArray[np.float64], velocities: NDArray[np.float64], n: int, hermite: bool
-) -> NDArray[np.float64]:
+def _leave_one_out(times: Floats, positions: Floats, velocities: Floats, n: int, hermite: bool) -> Floats:
     """Distances, m, of all states but the first and the last from their interpolation by n neighbours."""
     k = np.arange(1, len(times) - 1)
     nodes = np.clip(k - n // 2, 0, len(times) - n - 1)[:, None] + np.arange(n)
@@ -143,7 +135,7 @@ def _leave_one_out(
     return np.asarray(np.linalg.norm(predicted - positions[k], axis=1))
 
 
-def _check_times(times: NDArray[np.float64]) -> None:
+def _check_times(times: Floats) -> None:
     if len(times) < LEAST_STATES:
         raise ValueError(f"times has {len(times)} states; an orbit needs at least {LEAST_STATES}: give more states")
     steps = np.diff(times)
@@ -163,7 +155,7 @@ def _check_times(times: NDArray[np.float64]) -> None:
         )
 
 
-def _check_heights(positions: NDArray[np.float64]) -> None:
+def _check_heights(positions: Floats) -> None:
     height = wgs84.geodetic(positions)[2]
     if (height < DEEPEST).any():
         i = int(np.argmin(height))
@@ -173,7 +165,7 @@ def _check_heights(positions: NDArray[np.float64]) -> None:
         )
 
 
-def _check_fall(times: NDArray[np.float64], positions: NDArray[np.float64], velocities: NDArray[np.float64]) -> None:
+def _check_fall(times: Floats, positions: Floats, velocities: Floats) -> None:
     """ValueError where accelerations are not those of satellites over the rotating Earth, g - 2 w x v - w x (w x r)."""
     n_nodes = min(len(times), 8)
     inner = slice(1, -1)
@@ -182,7 +174,7 @@ def _check_fall(times: NDArray[np.float64], positions: NDArray[np.float64], velo
     gravity = -GM * p / np.linalg.norm(p, axis=1, keepdims=True) ** 3
     turn = -2 * spin(v) - spin(spin(p))
 
-    def size(a: NDArray[np.float64]) -> float:
+    def size(a: Floats) -> float:
         return float(np.sqrt((a**2).sum(axis=1).mean()))
 
     misfit, misfit_inertial = size(acceleration - gravity - turn), size(acceleration - gravity)
@@ -201,9 +193,7 @@ def _check_fall(times: NDArray[np.float64], positions: NDArray[np.float64], velo
         )
 
 
-def _check_velocities(
-    times: NDArray[np.float64], positions: NDArray[np.float64], velocities: NDArray[np.float64]
-) -> None:
+def _check_velocities(times: Floats, positions: Floats, velocities: Floats) -> None:
     derived = [_slopes(times, positions, n) for n in (min(len(times), 8), min(len(times), 8) - 1)]
     uncertainty = np.linalg.norm(derived[0] - derived[1], axis=1)  # about the error of the derivative at this spacing
     misfit = np.linalg.norm(velocities - derived[0], axis=1)
@@ -232,7 +222,7 @@ def _ranges(rows: NDArray[np.int64]) -> str:
     return f"[{', '.join(words[:6])}{', ...' if len(words) > 6 else ''}]"
 
 
-def _slopes(times: NDArray[np.float64], positions: NDArray[np.float64], n: int) -> NDArray[np.float64]:
+def _slopes(times: Floats, positions: Floats, n: int) -> Floats:
     """Derivatives of the positions at the states, m/s, by Lagrange interpolation through n of them."""
     k = np.arange(len(times))
     nodes = np.clip(k - n // 2, 0, len(times) - n)[:, None] + np.arange(n)

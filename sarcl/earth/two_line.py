@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.vectors import Floats
 from .rotation import SIDEREAL_RATE, rotated, sidereal_time
 from .state_vectors import interpolate
 
@@ -68,7 +68,7 @@ class TwoLineElements:
         """By the lines: sgp4's own object cannot be copied."""
         return type(self).parsed, self.lines
 
-    def teme(self, times: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def teme(self, times: Floats) -> tuple[Floats, Floats]:
         """Positions, m, and velocities, m/s (n, 3), as SGP4 gives them: true equator, mean equinox of date (TEME)."""
         positions, velocities = np.empty((len(times), 3)), np.empty((len(times), 3))
         for i, t in enumerate(times.tolist()):
@@ -82,7 +82,7 @@ class TwoLineElements:
                 )
         return positions * 1e3, velocities * 1e3
 
-    def at(self, times: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def at(self, times: Floats) -> tuple[Floats, Floats]:
         """Earth-fixed positions, m, and velocities, m/s (n, 3), at times, s (n,)."""
         steps = np.floor(times / STEP).astype(np.int64)[:, None] + np.arange(1 - NODES // 2, NODES // 2 + 1)
         nodes, inverse = np.unique(steps, return_inverse=True)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..base import wgs84
 from ..base.constants import SPEED_OF_LIGHT
+from ..base.vectors import Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,29 +23,24 @@ class View:
     range_rate, range_acceleration   m/s, m/s^2: derivatives of the slant range
     """
 
-    slant_range: NDArray[np.float64]
-    ground_range: NDArray[np.float64]
-    incidence: NDArray[np.float64]
-    look: NDArray[np.float64]
-    squint: NDArray[np.float64]
-    range_rate: NDArray[np.float64]
-    range_acceleration: NDArray[np.float64]
+    slant_range: Floats
+    ground_range: Floats
+    incidence: Floats
+    look: Floats
+    squint: Floats
+    range_rate: Floats
+    range_acceleration: Floats
 
-    def doppler(self, frequency: float) -> NDArray[np.float64]:
+    def doppler(self, frequency: float) -> Floats:
         """Doppler frequencies of echoes, Hz, at a carrier, Hz: -2 f/c times the range rate."""
         return -2 * frequency / SPEED_OF_LIGHT * self.range_rate
 
-    def doppler_rate(self, frequency: float) -> NDArray[np.float64]:
+    def doppler_rate(self, frequency: float) -> Floats:
         """Rates of the Doppler frequency, Hz/s, at a carrier, Hz: -2 f/c times the range acceleration."""
         return -2 * frequency / SPEED_OF_LIGHT * self.range_acceleration
 
 
-def view(
-    positions: NDArray[np.float64],
-    velocities: NDArray[np.float64],
-    accelerations: NDArray[np.float64],
-    points: NDArray[np.float64],
-) -> View:
+def view(positions: Floats, velocities: Floats, accelerations: Floats, points: Floats) -> View:
     """The view of points, m (..., 3), by antennas: m, m/s, m/s^2 (..., 3), all Earth-fixed."""
     path = points - positions
     distance = np.linalg.norm(path, axis=-1)
@@ -62,13 +58,13 @@ def view(
     )
 
 
-def normal(positions: NDArray[np.float64]) -> NDArray[np.float64]:
+def normal(positions: Floats) -> Floats:
     """The ellipsoid's unit normal (..., 3) through positions, m (..., 3)."""
     longitude, latitude, _ = wgs84.geodetic(positions)
     return wgs84.up(longitude, latitude)
 
 
-def hidden(positions: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.bool_]:
+def hidden(positions: Floats, points: Floats) -> NDArray[np.bool_]:
     """Whether the ellipsoid stands between antennas and points, m (..., 3) each."""
     axes = wgs84.SEMI_MAJOR * np.array([1, 1, 1 - wgs84.FLATTENING])
     start, path = points / axes, (positions - points) / axes
@@ -78,7 +74,7 @@ def hidden(positions: NDArray[np.float64], points: NDArray[np.float64]) -> NDArr
     return np.asarray((share > 0) & (nearest < 1))
 
 
-def ground_range(positions: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+def ground_range(positions: Floats, points: Floats) -> Floats:
     """Lengths of arcs, m (...), on the ellipsoid from below antennas to below points, m (..., 3) each.
 
     The arc lies in the plane through both ends and the Earth's centre. The geodesic is shorter by less than a
@@ -104,6 +100,6 @@ def ground_range(positions: NDArray[np.float64], points: NDArray[np.float64]) ->
     return np.asarray(total * angle / 2)
 
 
-def _angle(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+def _angle(a: Floats, b: Floats) -> Floats:
     """Angles between unit vectors (..., 3), rad, accurate near 0 too."""
     return np.asarray(2 * np.arctan2(np.linalg.norm(a - b, axis=-1), np.linalg.norm(a + b, axis=-1)))

@@ -8,13 +8,13 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..base import wgs84
+from ..base.vectors import Floats
 from .elevation import ElevationModel
 from .viewing import hidden, normal
 
-States = Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], NDArray[np.float64]]]
+States = Callable[[Floats], tuple[Floats, Floats]]
 
 COARSE = 60.0  # s: least time between zero-Doppler times of any orbit is half a revolution, 40 minutes
 PAIRS = 4_000_000  # pairs of positions and coarse times that are examined at once
@@ -25,9 +25,7 @@ EXCESS = 2e-9  # m: differences of heights below it are rounding
 LEAST_SPEED = 1.0  # m/s over the ground: below it there is no zero-Doppler plane
 
 
-def locate(
-    states: States, span: tuple[float, float], positions: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def locate(states: States, span: tuple[float, float], positions: Floats) -> tuple[Floats, Floats]:
     """Zero-Doppler times, s (n,), within span, and slant ranges, m (n,), of positions, m (n, 3).
 
     Of several passes over a position the one that comes closest counts. ValueError names the first position that no
@@ -78,14 +76,7 @@ def locate(
     return times, ranges
 
 
-def _crossings(
-    states: States,
-    x: NDArray[np.float64],
-    low: NDArray[np.float64],
-    high: NDArray[np.float64],
-    at_low: NDArray[np.float64],
-    at_high: NDArray[np.float64],
-) -> NDArray[np.float64]:
+def _crossings(states: States, x: Floats, low: Floats, high: Floats, at_low: Floats, at_high: Floats) -> Floats:
     """Times between low and high, s (n,), at which V.(x - P) is 0, from its values at both: Newton's iteration."""
     low, high = low.copy(), high.copy()
     least, most = low.copy(), high.copy()
@@ -110,12 +101,8 @@ def _crossings(
 
 
 def geolocate(
-    positions: NDArray[np.float64],
-    velocities: NDArray[np.float64],
-    ranges: NDArray[np.float64],
-    heights: NDArray[np.float64] | ElevationModel,
-    sign: float,
-) -> NDArray[np.float64]:
+    positions: Floats, velocities: Floats, ranges: Floats, heights: Floats | ElevationModel, sign: float
+) -> Floats:
     """Positions, m (n, 3), at slant ranges, m (n,), in the zero-Doppler planes of antennas, m and m/s (n, 3).
 
     heights  above the ellipsoid, m (n,), or an elevation model;  sign  1 right of the velocity seen from above, -1 left
@@ -257,7 +244,7 @@ def _clearance(arc: _Arc, model: ElevationModel, angle: np.ndarray) -> np.ndarra
     return np.asarray(height - model.heights_at(longitude, latitude))
 
 
-def ray_ends(positions: NDArray[np.float64], directions: NDArray[np.float64], height: float) -> NDArray[np.float64]:
+def ray_ends(positions: Floats, directions: Floats, height: float) -> Floats:
     """Positions, m (n, 3), where rays from antennas, m (n, 3), along unit vectors (n, 3) meet a height, m.
 
     ValueError names the first ray that passes over the horizon.

@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..base import validation, wgs84
+from ..base.vectors import Floats
 from ..earth import rotation, viewing
 from . import pointing
 from .trajectory import Trajectory
@@ -18,7 +19,7 @@ ATTITUDES = ("zero-doppler", "yaw", "orbital")
 DEEPEST = -20e3  # m: positions farther below the ellipsoid are refused
 
 
-def places(positions: ArrayLike) -> NDArray[np.float64]:
+def places(positions: ArrayLike) -> Floats:
     """Earth-fixed positions, m (..., 3). ValueError for positions deep inside the Earth."""
     x = validation.converted("positions", positions, np.float64)
     if x.shape[-1:] != (3,):
@@ -34,7 +35,7 @@ def places(positions: ArrayLike) -> NDArray[np.float64]:
     return x
 
 
-def together(**arrays: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+def together(**arrays: Floats) -> list[Floats]:
     """Arrays of one shape; ValueError names those whose shapes do not fit together."""
     try:
         return list(np.broadcast_arrays(*arrays.values()))
@@ -51,9 +52,7 @@ def span_of(value: Sequence[float]) -> tuple[float, float]:
     return float(pair[0]), float(pair[1])
 
 
-def axes_of(
-    p: NDArray[np.float64], v: NDArray[np.float64], attitude: Attitude, look: float, side: Literal["right", "left"]
-) -> NDArray[np.float64]:
+def axes_of(p: Floats, v: Floats, attitude: Attitude, look: float, side: Literal["right", "left"]) -> Floats:
     """Rotations from body to Earth-fixed axes (n, 3, 3) of antennas at p, m, that move with v, m/s: (n, 3) each.
 
     Arguments as in `Orbit.trajectory`; columns as in `sarcl.pointing`: boresight, azimuth, elevation.
@@ -69,7 +68,7 @@ def axes_of(
     return axes
 
 
-def ellipse(azimuth: float, elevation: float, n: int) -> NDArray[np.float64]:
+def ellipse(azimuth: float, elevation: float, n: int) -> Floats:
     """n unit vectors in body axes (n, 3) around the edge of an elliptic beam of full angles, rad."""
     around = 2 * np.pi * np.arange(n) / n
     a, e = azimuth / 2 * np.cos(around), elevation / 2 * np.sin(around)

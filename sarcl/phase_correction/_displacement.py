@@ -11,10 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..base.constants import SPEED_OF_LIGHT
-from ..base.vectors import unit
+from ..base.vectors import Floats, unit
 from . import _bright_points
 from ._aperture_view import NO_LAG, ApertureView, Errors
 
@@ -40,10 +39,10 @@ class Displacements:
     common  share of their pulses that two places have in common, at the weakest link of the strongest chain of all
     """
 
-    places: NDArray[np.float64]
-    along: NDArray[np.float64]
-    peaks: NDArray[np.float64]
-    cells: NDArray[np.float64]
+    places: Floats
+    along: Floats
+    peaks: Floats
+    cells: Floats
     common: float
 
     @property
