@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -72,9 +72,10 @@ def beam(
     if not out.size:
         return out.reshape(t.shape + x.shape[:-1])
     extent = float(np.linalg.norm(array.positions, axis=1).max())
-    ranges = _ranges(points, origin)
-    plan = make_plan(opened, tolerance, float(carriers.max()), extent, float(np.abs(t).max()), float(ranges.max()))
-    work = _Field(opened, plan, array, carriers, points, ranges, origin, budget)
+    places = _Places.seen(points, origin)
+    farthest = float(places.ranges.max())
+    plan = make_plan(opened, tolerance, float(carriers.max()), extent, float(np.abs(t).max()), farthest)
+    work = _Field(opened, plan, array, carriers, places, budget)
     if np.ptp(offsets) == 0:  # the field is a product of functions of time and of position
         work.add(np.zeros(1), once := np.empty((1, len(points)), kind))
         cycles = fraction(carriers[0] * t.ravel().astype(np.longdouble))
@@ -84,12 +85,21 @@ def beam(
     return out.reshape(t.shape + x.shape[:-1])
 
 
-def _ranges(points: np.ndarray, origin: np.ndarray) -> np.ndarray:
-    out = np.empty(len(points), np.longdouble)
-    for i in range(0, len(points), SLICE):
-        v = points[i : i + SLICE].astype(np.longdouble) - origin
-        out[i : i + SLICE] = np.sqrt((v * v).sum(axis=1))
-    return out
+class _Places(NamedTuple):
+    """Points, m (n, 3), the array's reference point (3,), and ranges between them, m (n,), in extended precision."""
+
+    points: np.ndarray
+    origin: np.ndarray
+    ranges: np.ndarray
+
+    @classmethod
+    def seen(cls, points: np.ndarray, origin: np.ndarray) -> _Places:
+        """With the ranges of the points."""
+        ranges = np.empty(len(points), np.longdouble)
+        for i in range(0, len(points), SLICE):
+            v = points[i : i + SLICE].astype(np.longdouble) - origin
+            ranges[i : i + SLICE] = np.sqrt((v * v).sum(axis=1))
+        return cls(points, origin, ranges)
 
 
 class _Field:
@@ -101,13 +111,11 @@ class _Field:
         plan: FieldPlan,
         array: AntennaArray,
         carriers: np.ndarray,
-        points: np.ndarray,
-        ranges: np.ndarray,
-        origin: np.ndarray,
+        places: _Places,
         budget: float,
     ) -> None:
         self.device, self.plan, self.budget = device, plan, budget
-        self.carriers, self.points, self.ranges, self.origin = carriers, points, ranges, origin
+        self.carriers, (self.points, self.origin, self.ranges) = carriers, places
         self.center = (carriers.min() + carriers.max()) / 2
         self.offsets = carriers - self.center
         self.elements = array.positions.T

@@ -176,7 +176,7 @@ def drawn_shape(shape: tuple[int, int], spacing: tuple[float, float] | None) -> 
 
 
 def _whole(n_old: int, n_new: float) -> int:
-    """`wanted` pixels for `old`, changed by up to 1 % where that makes the factor between them whole."""
+    """`n_new` pixels for `n_old`, changed by up to 1 % where that makes the factor between them whole."""
     multiple = n_old * round(n_new / n_old) if n_new >= n_old else -(-n_old // round(n_old / n_new))
     return multiple if abs(multiple - n_new) <= 0.01 * n_new + 1 else round(n_new)
 

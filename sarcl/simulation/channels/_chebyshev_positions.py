@@ -66,9 +66,9 @@ def choose_positions(
         half = np.ptp(along, axis=0) / 2
         half[half <= FLAT * half.max()] = 0
         grid = _Grid(along - centre, half, middle + centre @ axes, axes, response)
-        found = grid.fewest(elements, allowed, min(most + 1, len(best)), least)
-        if found is not None:
-            best = found
+        positions = grid.fewest(elements, allowed, min(most + 1, len(best)), least)
+        if positions is not None:
+            best = positions
     return best
 
 
@@ -83,7 +83,7 @@ class _Grid:
     def fewest(self, elements: np.ndarray, allowed: float, fewer_than: float, least: int) -> Positions | None:
         """The fewest positions that keep the error, or None where that takes `fewer_than` or more."""
         extended = np.flatnonzero(self.half)
-        counts, some = [1, 1, 1], _sampled(self.along)
+        counts, sample = [1, 1, 1], _sampled(self.along)
         for axis in extended.tolist():  # each axis by itself
 
             def suffices(count: int, axis: int = axis) -> bool:
@@ -101,7 +101,7 @@ class _Grid:
                 middle = (few + counts[axis]) // 2
                 few, counts[axis] = (few, middle) if suffices(middle) else (middle, counts[axis])
         while int(np.prod(counts)) < fewer_than:
-            error = self._error(counts, self.along[some], elements[some])
+            error = self._error(counts, self.along[sample], elements[sample])
             if error <= allowed:
                 at, basis = self.made(counts, self.along)
                 return Positions(self.centre + at @ self.axes, basis, error)
@@ -112,11 +112,11 @@ class _Grid:
     def _error(self, counts: list[int], along: np.ndarray, elements: np.ndarray) -> float:
         """Largest interpolation error at elements, m (n, 3), that lie at `along` (n, 3)."""
         at, basis = self.made(counts, along)
-        there = self.response(self.centre + at @ self.axes)
+        at_nodes = self.response(self.centre + at @ self.axes)
         worst = 0.0
         for a in range(0, len(along), BLOCK):
-            wanted = self.response(elements[a : a + BLOCK])
-            worst = max(worst, float(np.abs(wanted - basis[a : a + BLOCK] @ there).max()))
+            exact = self.response(elements[a : a + BLOCK])
+            worst = max(worst, float(np.abs(exact - basis[a : a + BLOCK] @ at_nodes).max()))
         return SAFETY * worst
 
     def made(self, counts: list[int], along: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -54,13 +54,13 @@ class InterpolatedChannels:
         self.transmitters = np.unique(np.array([c.offset for c in layout.sent]) + 0.0, axis=0)
         self.receivers = self.transmitters if self.own else rows.receivers
         # errors of channels add up where the channels are summed
-        together = float(np.sqrt(layout.overlap))
+        sum_growth = float(np.sqrt(layout.overlap))
         self.tx = Positions(self.transmitters)
         self.rx = Positions(np.zeros((1, 3)) if self.own else self.receivers)
         if self._is_smooth(scene, vertical, tolerance):
             highest = layout.grid.frequency + layout.grid.n * layout.grid.step
             samples = ResponseSamples(rows, scene, weights, highest, self.transmitters, self.receivers)
-            allowed, most = SHARE * tolerance / together, self._most(len(scene.positions) + len(scene.triangles))
+            allowed, most = SHARE * tolerance / sum_growth, self._most(len(scene.positions) + len(scene.triangles))
             least = 2 if len(scene.triangles) else 1  # amplitudes of facets change linearly with position
             if self.own:
                 self.tx = choose_positions(self.transmitters, samples.two_way_response, allowed, most, least)
@@ -68,8 +68,8 @@ class InterpolatedChannels:
                 self.tx = choose_positions(self.transmitters, samples.tx_response, allowed / 2, most, least)
                 within = allowed / 2 / self.tx.growth
                 self.rx = choose_positions(self.receivers, samples.rx_response, within, most / len(self.tx), least)
-        self.growth = together * self.tx.growth * self.rx.growth
-        self.error = together * (self.tx.error + self.tx.growth * self.rx.error)
+        self.growth = sum_growth * self.tx.growth * self.rx.growth
+        self.error = sum_growth * (self.tx.error + self.tx.growth * self.rx.error)
         self.tolerance = (tolerance - self.error) / self.growth
         self.runs = len(self.tx) * len(self.rx) * len(rows.track)
         self._planned: dict[tuple[int, ...], tuple[ChannelEchoes, np.ndarray]] = {}
@@ -182,12 +182,12 @@ class InterpolatedChannels:
             if self.own
             else self._rx_lengths(rows.rx_positions(rows.receivers, slice(start, start + len(samples))))
         )
-        for channel, now, here in active_channels(layout.sent, start, len(samples)):
+        for channel, at, block in active_channels(layout.sent, start, len(samples)):
             if shared is None:
-                lengths = self._rx_lengths(rows.rx_positions(channel.offset[None], now))
+                lengths = self._rx_lengths(rows.rx_positions(channel.offset[None], at))
             else:
-                lengths = shared[0][here], shared[1][here]
-            self._add(scene, channel, now, echoes[:, :, here], samples[here], *lengths)
+                lengths = shared[0][block], shared[1][block]
+            self._add(scene, channel, at, echoes[:, :, block], samples[block], *lengths)
         scene.request.clock.lap("channels")
         return replace(added, error_terms=self.between(added.error_terms))
 
@@ -245,12 +245,12 @@ class InterpolatedChannels:
         number = int(np.flatnonzero((self.transmitters == channel.offset).all(axis=1))[0])
         part_of_band = echoes[..., layout.grid.part(channel.carrier)]
         if self.tx.basis is None:
-            some = part_of_band[number]
+            at_tx = part_of_band[number]
         else:
-            some = np.einsum("k,k...->...", self.tx.basis[number].astype(np.float32), part_of_band)
+            at_tx = np.einsum("k,k...->...", self.tx.basis[number].astype(np.float32), part_of_band)
         # no BLAS: its sums depend on how many pulses there are
-        every = some if self.rx.basis is None else np.einsum("jk,k...->j...", self.rx.basis.astype(np.float32), some)
-        values = np.moveaxis(every, 0, 1)
+        at_rx = at_tx if self.rx.basis is None else np.einsum("jk,k...->j...", self.rx.basis.astype(np.float32), at_tx)
+        values = np.moveaxis(at_rx, 0, 1)
         tx = rows.tx_positions(channel.offset, at)
         tx_to_reference = np.linalg.norm((tx if rows.separated else rows.track.tx[at]) - rows.point, axis=-1)
         reference = (tx_to_reference[:, None] + to_reference) / 2  # as `ChannelRows.fields` rounds it

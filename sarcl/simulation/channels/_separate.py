@@ -91,7 +91,7 @@ class ChannelLayout:
 class ChannelPlace(NamedTuple):
     """One channel at one receiver, at the pulses at which it is sent, and some of these.
 
-    first   number of its first pulse in the track;  some  pulses of a block, counted from there;  here  the same in
+    first   number of its first pulse in the track;  pulses  those of a block, counted from there;  block  the same in
             the block;  samples  in a row
     """
 
@@ -100,8 +100,8 @@ class ChannelPlace(NamedTuple):
     band: Waveform
     frequencies: np.ndarray
     first: int
-    some: range
-    here: slice
+    pulses: range
+    block: slice
     receiver: slice
     samples: slice
 
@@ -115,8 +115,7 @@ class SeparateChannels:
     @property
     def bands(self) -> list[Band]:
         """Band of each channel."""
-        made = [self.layout.samples(channel)[1] for channel in self.layout.sent]
-        return [self.layout.band(frequencies) for frequencies in made]
+        return [self.layout.band(self.layout.samples(channel)[1]) for channel in self.layout.sent]
 
     def least(self, scene: SceneEchoes) -> float:
         """Pulses of a block, at least: each plans all channels anew."""
@@ -139,10 +138,10 @@ class SeparateChannels:
         for one in self._places(start, len(samples)):
             spectrum = self.layout.spectrum(one.channel, one.frequencies) * scene.weights.factor(one.frequencies)
             planned = scene.channel(one.geometry, one.band, one.frequencies, one.first)
-            echoes, of_channel = echoes_of(planned, one.some, len(one.frequencies), done + added.counts.pairs, total)
+            echoes, of_channel = echoes_of(planned, one.pulses, len(one.frequencies), done + added.counts.pairs, total)
             added += of_channel
             shaped = (echoes * spectrum.astype(np.complex64))[:, None]
-            rows.add(samples[one.here], one.channel, one.receiver, one.samples, shaped)
+            rows.add(samples[one.block], one.channel, one.receiver, one.samples, shaped)
         return added
 
     def planned(self, scene: SceneEchoes) -> Added:
@@ -156,17 +155,17 @@ class SeparateChannels:
     def _places(self, start: int, n: int) -> Iterator[ChannelPlace]:
         """Every channel at every receiver, where it is sent at some of the n pulses from `start` on."""
         layout, rows = self.layout, self.layout.rows
-        for channel, at, here in active_channels(layout.sent, start, n):
+        for channel, at, block in active_channels(layout.sent, start, n):
             part, frequencies = layout.samples(channel)
             band = band_of(layout.waveform, channel.carrier, len(frequencies) * layout.grid.step)
             every = slice(channel.first, channel.stop)  # planned alike for all blocks
-            some = range(at.start - channel.first, at.stop - channel.first)
+            pulses = range(at.start - channel.first, at.stop - channel.first)
             tx = rows.tx_positions(channel.offset, every)
             _, rx, reference = rows.ends(channel.offset, every)
             for j in range(rows.n_receivers):
                 geometry = layout.geometry(tx, rx[:, j], reference[:, j], frequencies)
                 yield ChannelPlace(
-                    channel, geometry, band, frequencies, channel.first, some, here, slice(j, j + 1), part
+                    channel, geometry, band, frequencies, channel.first, pulses, block, slice(j, j + 1), part
                 )
 
     def between(self, terms: tuple[ErrorTerm, ...]) -> tuple[ErrorTerm, ...]:

@@ -123,22 +123,22 @@ class ArrayChannels:
         sums = np.zeros(3)
         for _ in range(draws):
             pulse, transmitter, receiver = (int(random.integers(n)) for n in rows.shape)
-            some = random.integers(0, samples.shape[-1], draws)
-            wanted = np.zeros((len(prepared.request.polarizations), draws), np.complex128)
-            power = np.zeros(wanted.shape)
+            columns = random.integers(0, samples.shape[-1], draws)
+            exact_sums = np.zeros((len(prepared.request.polarizations), draws), np.complex128)
+            power = np.zeros(exact_sums.shape)
             for channel, _, _ in active_channels(sent, pulse, 1):
                 part, frequencies = layout.samples(channel)
-                inside = (some >= part.start) & (some < part.stop)
+                inside = (columns >= part.start) & (columns < part.stop)
                 if not inside.any() or (rows.separated and transmitter not in channel.elements):
                     continue
-                f = frequencies[some[inside] - part.start]
+                f = frequencies[columns[inside] - part.start]
                 _, rx, reference = rows.ends(channel.offset, which=slice(receiver, receiver + 1))
                 geometry = layout.geometry(rows.tx_positions(channel.offset), rx[:, 0], reference[:, 0], f[:1])
                 weight = rows.array.weights[transmitter] if rows.separated else channel.weight
                 factor = weight * layout.spectrum(channel, f) * prepared.weights.factor(f)
                 values, powers = exact(prepared, geometry, pulse, f, prepared.weights.at(geometry))
-                wanted[:, inside] += values * factor
+                exact_sums[:, inside] += values * factor
                 power[:, inside] += powers * np.abs(factor) ** 2
-            row_samples = samples[pulse][transmitter, receiver][:, some]
-            sums += [np.sum(np.abs(row_samples - wanted) ** 2), np.sum(np.abs(wanted) ** 2), power.sum()]
+            row_samples = samples[pulse][transmitter, receiver][:, columns]
+            sums += [np.sum(np.abs(row_samples - exact_sums) ** 2), np.sum(np.abs(exact_sums) ** 2), power.sum()]
         return float(np.sqrt(sums[0] / max(sums[1], sums[2]))) if sums[0] else 0.0
