@@ -87,8 +87,8 @@ def papers(args: argparse.Namespace, job: Job) -> int:
         job.say(f"{section.title}{tally} ({section.seconds:.1f} s)")
         for row in section.rows:
             if not row.holds:
-                wanted = "printed" if row.basis == "paper" else "expected"
-                job.say(f"  differs: {row.item}: {wanted} {row.expected}, measured {row.measured}")
+                origin = "printed" if row.basis == "paper" else "expected"
+                job.say(f"  differs: {row.item}: {origin} {row.expected}, measured {row.measured}")
     job.say(f"wrote {output} and {numbers}")
     return 0
 

@@ -188,9 +188,9 @@ class Gridder:
         if OnDevice.possible(device, length, WORK * budget):
             end = OnDevice(device, length, flat, WORK * budget, True)
             grid, half = 8.0 * length[0] * length[1], 8.0 * shape[1] * length[0]
-            left = budget - end.nbytes - grid
-            if left >= sample_row and max(grid, half) <= device.info.max_alloc:
-                most = min(left, n_rows * sample_row, device.limits.upload)
+            rest = budget - end.nbytes - grid
+            if rest >= sample_row and max(grid, half) <= device.info.max_alloc:
+                most = min(rest, n_rows * sample_row, device.limits.upload)
                 return end, (n_tiles, max(1, int(most // sample_row)))
             end = OnDevice(device, length, flat, WORK * budget, False)
             if end.nbytes + end.across(self.tile) + sample_row <= budget:
@@ -249,11 +249,11 @@ class Gridder:
                         ),
                         buffer, cell, line, self.table, out, steps=stop - start,
                     )  # fmt: skip
-                    done = 0.8 * (first + (last - first) * stop / n_rows) / n_tiles
+                    share = 0.8 * (first + (last - first) * stop / n_rows) / n_tiles
 
-                    def spread(done: float = done) -> None:
+                    def spread(share: float = share) -> None:
                         clock.lap("gridding")
-                        on_progress(done)
+                        on_progress(share)
 
                     pipeline.step(spread)
                 if not samples.held and not isinstance(end, OnHost):  # known once all rows were read

@@ -83,9 +83,9 @@ class PulseGeometry:
 
     def picked(self, rows: np.ndarray) -> PulseGeometry:
         """The pulses `rows`, in this order. What remains of `runs` is not known."""
-        some: dict[str, Any] = {name: getattr(self, name)[rows] for name in ("tx", *PER_PULSE)}
-        some["rx"] = some["tx"] if self.is_monostatic else self.rx[rows]
-        return replace(self, **some, beam=None if self.beam is None else self.beam[rows], runs=())
+        fields: dict[str, Any] = {name: getattr(self, name)[rows] for name in ("tx", *PER_PULSE)}
+        fields["rx"] = fields["tx"] if self.is_monostatic else self.rx[rows]
+        return replace(self, **fields, beam=None if self.beam is None else self.beam[rows], runs=())
 
     def mean_direction(self, point: np.ndarray) -> np.ndarray:
         """Mean of the unit vectors from a point, m (3,), to both antennas, (n, 3): minus the gradient of half the path.

@@ -35,7 +35,7 @@ def keep(key: str, outcome: Outcome) -> None:
         descriptor, part = tempfile.mkstemp(dir=path.parent)
         try:
             with open(descriptor, "w") as file:
-                json.dump({name: asdict(found) for name, found in _record().items()}, file, indent=1)
+                json.dump({name: asdict(outcome) for name, outcome in _record().items()}, file, indent=1)
             os.replace(part, path)
         except BaseException:
             os.unlink(part)

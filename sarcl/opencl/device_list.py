@@ -82,16 +82,16 @@ def listed() -> tuple[tuple[DeviceInfo, Any], ...]:
 
 @functools.cache
 def _listed() -> tuple[tuple[DeviceInfo, Any], ...]:
-    found: list[tuple[DeviceInfo, Any]] = []
+    devices: list[tuple[DeviceInfo, Any]] = []
     for platform, _, handles in _queries.platforms():
         for handle in handles:
             facts = _queries.facts(handle)
             facts["why"] = facts["why"] or NOT_TRIED
             info = DeviceInfo(
-                index=len(found), platform=platform, works=False, fp64=False, fast_fp64=False, rate=0, **facts
+                index=len(devices), platform=platform, works=False, fp64=False, fast_fp64=False, rate=0, **facts
             )
-            found.append((info, handle))
-    return tuple(found)
+            devices.append((info, handle))
+    return tuple(devices)
 
 
 @functools.cache
@@ -125,11 +125,11 @@ def trial_of(index: int) -> Outcome:
 def distinct(infos: Iterable[DeviceInfo]) -> list[DeviceInfo]:
     """These devices, of each that several platforms list only that of the highest rate."""
     infos = list(infos)
-    kept: list[DeviceInfo] = []
+    out: list[DeviceInfo] = []
     for info in sorted(infos, key=lambda i: (-i.rate, i.index)):
-        if not any(_same(info, other, infos) for other in kept):
-            kept.append(info)
-    return sorted(kept, key=lambda i: i.index)
+        if not any(_same(info, other, infos) for other in out):
+            out.append(info)
+    return sorted(out, key=lambda i: i.index)
 
 
 def _same(a: DeviceInfo, b: DeviceInfo, infos: list[DeviceInfo]) -> bool:

@@ -81,14 +81,14 @@ def displacements(view: ApertureView, errors: Errors, power: np.ndarray) -> Disp
     """Displacements of the brightest points of the corrected image, whose power is given, by the correction."""
     places = bright_places(view, power)[0]
     seen = _seen(view, errors, places)
-    moved, peaks, cells = (np.empty(len(places)) for _ in range(3))
+    shifts, peaks, cells = (np.empty(len(places)) for _ in range(3))
     for k, place in enumerate(places):
         along = shift_phase(view, place, seen[:, k])
-        moved[k] = _slope(errors[0], along, seen[:, k])
+        shifts[k] = _slope(errors[0], along, seen[:, k])
         cells[k] = 2 * np.pi / max(float(np.ptp(along[seen[:, k] > 0])), 1e-300)
         # over a narrow aperture nearly all pulses see nearly all places, and what blurs them moves all peaks alike
-        peaks[k] = moved[k] if view.is_narrow else moved[k] + _peak(errors[0] - moved[k] * along, along, seen[:, k])
-    return Displacements(places, moved, peaks, cells, _weakest_link(seen))
+        peaks[k] = shifts[k] if view.is_narrow else shifts[k] + _peak(errors[0] - shifts[k] * along, along, seen[:, k])
+    return Displacements(places, shifts, peaks, cells, _weakest_link(seen))
 
 
 def _peak(phase: np.ndarray, along: np.ndarray, seen: np.ndarray) -> float:

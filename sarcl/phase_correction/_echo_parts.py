@@ -119,6 +119,6 @@ class _Less(RowsOnDemand):
         self.raw, self.mean = raw, mean
         self.shape, self.dtype = raw.samples.shape, np.dtype(np.complex64)
 
-    def rows(self, some: slice) -> np.ndarray:
-        constant = self.mean[np.arange(some.start, some.stop) % len(self.mean)] * _late(self.raw, some)
-        return (np.asarray(self.raw.samples[some]) - constant).astype(np.complex64)
+    def rows(self, rows: slice) -> np.ndarray:
+        constant = self.mean[np.arange(rows.start, rows.stop) % len(self.mean)] * _late(self.raw, rows)
+        return (np.asarray(self.raw.samples[rows]) - constant).astype(np.complex64)

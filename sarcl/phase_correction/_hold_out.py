@@ -273,16 +273,16 @@ def _least_of_curves(curves: _Curves, closeness: Callable[[np.ndarray, np.ndarra
     return max(AGREE, _phase_smoothing.chance(curves.modes), *(closeness(curve, zero) for curve in curves.phases))
 
 
-def _apart(moved: _displacement.Displacements, agreement: float) -> str:
+def _apart(displacements: _displacement.Displacements, agreement: float) -> str:
     """Reason to refuse a correction that moves bright places against one another; empty where there is none.
 
     Each place alone is as sharp wherever it lies. That two of them belong where the phase puts them is known as far as
     the same pulses see both, and as far as the halves of the band say the same.
     """
-    if moved.apart <= APART or (agreement >= SURE and moved.common >= COMMON):
+    if displacements.apart <= APART or (agreement >= SURE and displacements.common >= COMMON):
         return ""
-    doubt = UNSURE.format(agreement, SURE) if agreement < SURE else UNLINKED.format(moved.common, COMMON)
-    return MOVED_APART.format(np.ptp(moved.along), moved.apart, doubt)
+    doubt = UNSURE.format(agreement, SURE) if agreement < SURE else UNLINKED.format(displacements.common, COMMON)
+    return MOVED_APART.format(np.ptp(displacements.along), displacements.apart, doubt)
 
 
 def _sharpens_others(view: ApertureView, errors: Errors) -> bool:
@@ -306,14 +306,14 @@ def _none_lost(view: ApertureView, errors: Errors, power: np.ndarray) -> bool:
     image lie beside the targets: as far as the phase moves a place by its slope, which is more metres for a far place.
     """
     zero = np.zeros(view.n)
-    new, now = _bright_points.pixels_and_levels(power, view.grid, _bright_points.CANDIDATES)
+    bright, levels = _bright_points.pixels_and_levels(power, view.grid, _bright_points.CANDIDATES)
     # a phase that changes by so much per pulse moves a point by so much across range, unless it soon turns back
     span = max(1, view.n // SPANS)
     slope = np.percentile(np.abs(errors[0][span:] - errors[0][:-span]), 90) / span
     for place, level in zip(*_displacement.bright_places(view, view.power((zero, zero))), strict=True):
         per_metre = np.ptp(_displacement.shift_phase(view, place, np.ones(view.n))) / view.n
-        near = np.linalg.norm(new - place, axis=1) <= 2 * view.cell + slope / max(per_metre, 1e-300)
-        if now[near].max(initial=0.0) < LOST * level:
+        near = np.linalg.norm(bright - place, axis=1) <= 2 * view.cell + slope / max(per_metre, 1e-300)
+        if levels[near].max(initial=0.0) < LOST * level:
             log.debug("the point at %s, bright before, is lost", place)
             return False
     return True

@@ -81,8 +81,8 @@ class Builder:
             return self.one("grid")
         with self.scenario.where.blame(("grid", kind), table):
             local = on_terrain(place, table) if kind == "on_terrain" else table
-        made: ImageGrid = self.call(("grid", kind), local, _schema.calls("grid")[kind])
-        return made.on_earth(place.longitude, place.latitude, place.height)
+        grid: ImageGrid = self.call(("grid", kind), local, _schema.calls("grid")[kind])
+        return grid.on_earth(place.longitude, place.latitude, place.height)
 
     def scene(self) -> Scene:
         """The Scene: the sum of its tables, in the order they first appear; with [place], Earth-fixed."""

@@ -22,15 +22,15 @@ def earth_fixed(place: Place | None, table: Mapping[str, Any]) -> dict[str, Any]
     """A table with the positions and directions in it, local to a place, in Earth-fixed coordinates."""
     if place is None:
         return dict(table)
-    made: dict[str, Any] = {}
+    out: dict[str, Any] = {}
     for key, value in table.items():
         vector = isinstance(value, list) and np.shape(value)[-1:] == (3,)
         if vector and key in POSITIONS:
             value = place.positions(np.asarray(value, np.float64))
         elif vector and key in DIRECTIONS:
             value = np.asarray(value, np.float64) @ place.axes
-        made[key] = value
-    return made
+        out[key] = value
+    return out
 
 
 def on_terrain(place: Place, table: Mapping[str, Any]) -> dict[str, Any]:

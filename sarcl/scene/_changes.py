@@ -69,12 +69,12 @@ def on_earth(scene: Scene, longitude: float, latitude: float, height: float = 0.
     from ..earth.place import Place
 
     place = Place(longitude, latitude, height)
-    moved: dict[str, Any] = {
+    fields: dict[str, Any] = {
         n: validation.sealed(place.positions(getattr(scene, n))) for n in ("positions", "triangles")
     }
     if scene.has_random_points:
-        moved["point_roughness"] = validation.sealed(np.asarray(scene.point_roughness @ place.axes))
-    return replace(scene, heights=None, **moved)
+        fields["point_roughness"] = validation.sealed(np.asarray(scene.point_roughness @ place.axes))
+    return replace(scene, heights=None, **fields)
 
 
 def realized(scene: Scene, seed: int = 0) -> Scene:

@@ -225,16 +225,16 @@ def pair(at: np.ndarray, values: np.ndarray, separation: float) -> Pair:
     return out
 
 
-def is_resolved(found: Pair, null: float, least: float = RESOLVED) -> bool:
+def is_resolved(two: Pair, null: float, least: float = RESOLVED) -> bool:
     """Whether a cut shows two points resolved: as many peaks as points, each in its place.
 
     There is a dip of `least` dB between two peaks, each within a quarter of `null`, m, of its point and at most 6 dB
-    below a unit point in focus, and every other peak is 3 dB or more below the lower of the two. found: from `pair`
+    below a unit point in focus, and every other peak is 3 dB or more below the lower of the two. two: from `pair`
     """
-    if found["shift"] is None or found["false_db"] is None:
+    if two["shift"] is None or two["false_db"] is None:
         return False
-    in_place = found["shift"] <= NEAR * null and found["level_db"] >= WEAK
-    return in_place and found["dip_db"] >= least and found["false_db"] <= -RESOLVED
+    in_place = two["shift"] <= NEAR * null and two["level_db"] >= WEAK
+    return in_place and two["dip_db"] >= least and two["false_db"] <= -RESOLVED
 
 
 def told_apart(dips: Sequence[PairApart], null: float, least: float = RESOLVED) -> float | None:
@@ -278,9 +278,9 @@ def _described(raw: PhaseHistory, case: Case) -> dict[str, Any]:
     }
 
 
-def _support(found: np.ndarray) -> dict[str, Any]:
-    some = np.random.default_rng(0).permutation(found)[:DRAWN]
-    return {"claimed": float(np.ptp(found[:, 1])), "support": some.round(4).tolist()}
+def _support(frequencies: np.ndarray) -> dict[str, Any]:
+    sample = np.random.default_rng(0).permutation(frequencies)[:DRAWN]
+    return {"claimed": float(np.ptp(frequencies[:, 1])), "support": sample.round(4).tolist()}
 
 
 def spatial_frequencies(raw: PhaseHistory, most: int = 40) -> np.ndarray:

@@ -131,13 +131,13 @@ def _widths(point: Mapping[str, float]) -> list[str]:
     return [f"{point['null']:.4f}", f"{point['irw']:.4f}", f"{point['pslr_db']:.2f}", f"{point['islr_db']:.2f}"]
 
 
-def _dip(found: Mapping[str, Any], near: float) -> str:
+def _dip(pair: Mapping[str, Any], near: float) -> str:
     """A dip, and whether the points are resolved; near: allowed error of position, m."""
-    text = f"{found['dip_db']:.1f}"
-    if found["resolved"]:
+    text = f"{pair['dip_db']:.1f}"
+    if pair["resolved"]:
         return f"{text} resolved"
-    if found["dip_db"] < RESOLVED:
+    if pair["dip_db"] < RESOLVED:
         return text
-    if len(found["peaks"]) != 2:
-        return f"{text}, {len(found['peaks'])} peaks"
-    return f"{text}, {found['shift']:.3f} m off" if found["shift"] > near else f"{text}, at {found['level_db']:.1f} dB"
+    if len(pair["peaks"]) != 2:
+        return f"{text}, {len(pair['peaks'])} peaks"
+    return f"{text}, {pair['shift']:.3f} m off" if pair["shift"] > near else f"{text}, at {pair['level_db']:.1f} dB"

@@ -36,8 +36,8 @@ def _poles(out: Section) -> None:
     angles = np.arange(-84.63, 85.0, 1.0)  # deg; none of them on a pole
     elevation, azimuth = np.meshgrid(np.radians(angles), np.radians(angles), indexing="ij")
     u = directions(azimuth, elevation)
-    given: dict[str, Any] = {"shape": SHAPE, "spacing": SPACING, "frequency_step": STEPS, "retarded": -TIME}
-    right = np.abs(diverse_factor(F0, cosines=(u[..., 1], u[..., 2]), **given)) / 81
+    factor: dict[str, Any] = {"shape": SHAPE, "spacing": SPACING, "frequency_step": STEPS, "retarded": -TIME}
+    right = np.abs(diverse_factor(F0, cosines=(u[..., 1], u[..., 2]), **factor)) / 81
     phase = [2 * np.pi * (STEPS[i] * -TIME + F0 * SPACING[i] * u[..., 1 + i] / SPEED_OF_LIGHT) for i in (0, 1)]
     swapped = 2 * np.pi * (STEPS[1] * -TIME + F0 * SPACING[1] * u[..., 1] / SPEED_OF_LIGHT)  # kappa_y for kappa_z
     tops = [np.sin(9 * p / 2) for p in phase]

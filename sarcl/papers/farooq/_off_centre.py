@@ -48,10 +48,10 @@ def section(lab: Lab) -> Section:
     return out
 
 
-def _reason(found: experiment.PairApart, null: float) -> str:
+def _reason(pair: experiment.PairApart, null: float) -> str:
     """Whether a pair of points is resolved, and why not, in words."""
-    why = unresolved(found, null)
-    text = f"at {found['separation']:g} m the dip is {found['dip_db']:.1f} dB"
+    why = unresolved(pair, null)
+    text = f"at {pair['separation']:g} m the dip is {pair['dip_db']:.1f} dB"
     return f"{text} and the points are {'not resolved: ' + '; '.join(why) if why else 'resolved'}"
 
 

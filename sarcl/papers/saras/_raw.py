@@ -51,8 +51,8 @@ def figure_9(lab: Lab) -> Section:
     }  # fmt: skip
     raw, direct = (make(scene, CHIRP, track, tolerance=1e-2, **options) for make in (spectral_echo, echo))
     paper = spectral_echo(scene, CHIRP, track, variant="saras", tolerance=PAPER_TOLERANCE, **options)
-    apart, of_paper = (_apart(made, direct) for made in (raw, paper))
-    out.states("raw signal by Fourier transforms and by the sum over facets and pulses", apart, apart < 2e-2)
+    difference, of_paper = (_apart(samples, direct) for samples in (raw, paper))
+    out.states("raw signal by Fourier transforms and by the sum over facets and pulses", difference, difference < 2e-2)
     footprint = WIDTH * np.hypot(HEIGHT, DISTANCE)
     order = SPEED_OF_LIGHT / CHIRP.center * np.hypot(HEIGHT, DISTANCE) / (2 * np.pi * footprint**2)
     holds = order / 5 < of_paper < 5 * order

@@ -73,13 +73,13 @@ def _correlations(out: Section, lab: Lab, radar: FarRadar, raw: PhaseHistory, n:
     shape = [int((k - 8) / s) for k, s in zip(n, size, strict=True)]
     pixels = radar.focus(raw, radar.grid(shape, (1 / size[0], 1 / size[1])), device=lab.device)
     table = np.array([[_correlation(pixels, azimuth, along) for azimuth in range(5)] for along in range(5)])
-    for name, printed, found in (("azimuth", TABLE[0], table[0]), ("range", [row[0] for row in TABLE], table[:, 0])):
+    for name, printed, measured in (("azimuth", TABLE[0], table[0]), ("range", [row[0] for row in TABLE], table[:, 0])):
         for lag in range(1, 5):
             why = {} if lag == 1 else {"why": ""}
             out.words = {"lag": lag, "name": name}
-            out.number("autocorrelation, lag {lag} in {name}", float(found[lag]), expected=printed[lag], **why)
-    apart = float(np.abs(table - TABLE).max())
-    out.states("autocorrelation at all 25 lags", apart, apart < 0.06)
+            out.number("autocorrelation, lag {lag} in {name}", float(measured[lag]), expected=printed[lag], **why)
+    difference = float(np.abs(table - TABLE).max())
+    out.states("autocorrelation at all 25 lags", difference, difference < 0.06)
     error = 1 / np.sqrt(np.prod(shape) * np.prod(size))
     out.say(size=size, error=error, shape=shape)
     rows = [[str(i), *(f"{a:.2f} / {b:.2f}" for a, b in zip(TABLE[i], table[i], strict=True))] for i in range(5)]

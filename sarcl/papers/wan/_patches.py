@@ -37,8 +37,8 @@ def section(lab: Lab) -> Section:
     out.plot(
         "Brightness of the 16 patches",
         [
-            (name, np.arange(1, 17), 10 * np.log10(found[in_order] / found.min()))
-            for name, found in (("a: roughness", rough), ("b: permittivity", eps))
+            (name, np.arange(1, 17), 10 * np.log10(brightness[in_order] / brightness.min()))
+            for name, brightness in (("a: roughness", rough), ("b: permittivity", eps))
         ],
     )
     out.keep(roughness=rough, permittivity=eps, slope=slope)

@@ -83,17 +83,17 @@ def _draw_waves(out: Section, raw: PhaseHistory) -> None:
     out.plot("Field of two pulses at the receiver", [(name, delay, field.samples[row].real) for name, row in rows])
 
 
-def _say(out: Section, found: Levels, both: PhaseHistory) -> None:
+def _say(out: Section, levels: Levels, both: PhaseHistory) -> None:
     """Levels of a target, and how its echoes were computed, in words and for JSON."""
-    cross = 20 * np.log10(max(found.peak[1] / found.peak[0], LEAST))
+    cross = 20 * np.log10(max(levels.peak[1] / levels.peak[0], LEAST))
     report, grid = report_of(both)
     model = report.model_error
-    peak, optics = 20 * np.log10(found.peak[0]), 20 * np.log10(found.optics)
-    out.words |= {"peak_db": peak, "optics_db": optics, "found": found, "cross": cross, "model_error": model or 0}
+    peak, optics = 20 * np.log10(levels.peak[0]), 20 * np.log10(levels.optics)
+    out.words |= {"peak_db": peak, "optics_db": optics, "found": levels, "cross": cross, "model_error": model or 0}
     out.say(grid=grid, cell_mm=1e3 * grid["cell_m"], predicted=report.predicted_error)
     out.keep(
-        peak_hh_dbsm=20 * np.log10(found.peak[0]), cross_over_co_db=cross, rms_hh=found.rms[0], rms_vh=found.rms[1],
-        peak_hh_optics_dbsm=20 * np.log10(found.optics), optics_differs=found.apart, model_error=model,
+        peak_hh_dbsm=20 * np.log10(levels.peak[0]), cross_over_co_db=cross, rms_hh=levels.rms[0], rms_vh=levels.rms[1],
+        peak_hh_optics_dbsm=20 * np.log10(levels.optics), optics_differs=levels.apart, model_error=model,
         forming_error=report.predicted_error, anchors=grid["anchors"],
     )  # fmt: skip
 

@@ -42,9 +42,9 @@ class ResponseSamples:
         self.outer = np.concatenate([off, np.diag(off[-1]), -np.diag(off[-1])])  # face centres too: they may be nearest
         self.off = self.outer
         if weights.is_needed:
-            every = np.concatenate([scene.positions, centroids(scene.triangles)]) - self.center
-            some = np.random.default_rng(0).choice(len(every), min(len(every), SCATTERERS), replace=False)
-            self.off = np.concatenate([self.outer, every[some]])
+            scatterers = np.concatenate([scene.positions, centroids(scene.triangles)]) - self.center
+            sample = np.random.default_rng(0).choice(len(scatterers), min(len(scatterers), SCATTERERS), replace=False)
+            self.off = np.concatenate([self.outer, scatterers[sample]])
         self.tx_pulses = self._sampled_pulses(rows.tx_positions, transmitters)
         self.rx_pulses = self._sampled_pulses(rows.rx_positions, receivers)
         self.levels = 1.0, 1.0
@@ -62,8 +62,8 @@ class ResponseSamples:
     def two_way_response(self, elements: np.ndarray) -> np.ndarray:
         """Response (m, k) of elements, m (m, 3), that each receive what they transmit."""
         at = np.union1d(self.tx_pulses, self.rx_pulses)
-        sent = self._response(0, self.rows.tx_positions, elements, at)
-        return sent * self._response(1, self.rows.rx_positions, elements, at) / self.levels[0]
+        tx = self._response(0, self.rows.tx_positions, elements, at)
+        return tx * self._response(1, self.rows.rx_positions, elements, at) / self.levels[0]
 
     def _sampled_pulses(self, to_scene: ToScene, elements: np.ndarray) -> np.ndarray:
         """Pulses spread along the track, and those at which phases differ most between points, over the array's box."""
@@ -72,8 +72,8 @@ class ResponseSamples:
         n = len(self.rows.track)
         change = np.zeros(n)
         for start in range(0, n, BLOCK):
-            here = slice(start, min(start + BLOCK, n))
-            change[here] = np.ptp(self._cycles(to_scene(box, here), self.outer), axis=1).max(axis=-1)
+            block = slice(start, min(start + BLOCK, n))
+            change[block] = np.ptp(self._cycles(to_scene(box, block), self.outer), axis=1).max(axis=-1)
         most = np.argsort(change)[-PULSES // 4 :]
         return np.unique(np.concatenate([spread_over(n, PULSES), most]))
 

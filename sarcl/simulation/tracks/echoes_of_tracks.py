@@ -57,18 +57,18 @@ class EchoesOfTracks:
         )
 
     @staticmethod
-    def _receivers(asked: object, n: int) -> tuple[Trajectory | None, ...]:
-        if asked is None:
+    def _receivers(tracks: object, n: int) -> tuple[Trajectory | None, ...]:
+        if tracks is None:
             return (None,) * n
-        if not isinstance(asked, (list, tuple)):
+        if not isinstance(tracks, (list, tuple)):
             raise TypeError(
-                f"receiver is a {type(asked).__name__}, and track is a list of {n}; give a list of as many receivers"
+                f"receiver is a {type(tracks).__name__}, and track is a list of {n}; give a list of as many receivers"
             )
-        if len(asked) != n:
-            raise ValueError(f"receiver is a list of {len(asked)} tracks, and track of {n}; give one for each track")
-        for i, receiver in enumerate(asked):
+        if len(tracks) != n:
+            raise ValueError(f"receiver is a list of {len(tracks)} tracks, and track of {n}; give one for each track")
+        for i, receiver in enumerate(tracks):
             instance(f"receiver[{i}]", receiver, Trajectory)
-        return tuple(asked)
+        return tuple(tracks)
 
     def plan_of(self, i: int, out: Path | None = None) -> Plan[PhaseHistory]:
         """The plan of the echoes of track number i."""
@@ -81,18 +81,18 @@ class EchoesOfTracks:
         Where not all are planned, the predicted error is the tolerance, which bounds those of all.
         """
         n = len(self.tracks)
-        some = spread_over(n, FORECAST)
-        parts = [self.plan_of(i).forecast() for i in some]
+        sample = spread_over(n, FORECAST)
+        parts = [self.plan_of(i).forecast() for i in sample]
         lengths = [len(track) for track in self.tracks]
-        share = sum(lengths) / sum(lengths[i] for i in some)
+        share = sum(lengths) / sum(lengths[i] for i in sample)
         worst = max(parts, key=lambda part: part.predicted_error)
         return Forecast(
             method=worst.method,
             plan={**worst.plan, "tracks": n},
             seconds=share * sum(part.seconds for part in parts),
             bytes=share * sum(part.bytes for part in parts),
-            predicted_error=worst.predicted_error if len(some) == n else self.options.tolerance,
-            error_terms=worst.error_terms if len(some) == n else (),
+            predicted_error=worst.predicted_error if len(sample) == n else self.options.tolerance,
+            error_terms=worst.error_terms if len(sample) == n else (),
             n_rows=round(share * sum(part.n_rows or 0 for part in parts)),
             n_samples=max(part.n_samples or 0 for part in parts),
             planning=sum(part.planning for part in parts),
