@@ -223,7 +223,7 @@ def test_the_profile_of_a_line_holds_its_curvature(squint, left, bistatic):
     raw = spaceborne(n_rows=9, squint=squint, bistatic=bistatic)
     antennas, side = make_task(raw, PLANE, None, None, False, True).antennas, 64
     steps = _line_curvature.steps(sarcl.ImageGrid.plane(shape=(64, 64), spacing=PLANE.spacing))
-    directions = _line_curvature.SampledDirections.at(np.zeros((1, 3)), antennas.tx, antennas.rx, steps)
+    directions = _line_curvature.SampledDirections.at(np.zeros((1, 3)), antennas.ends, steps)
     bend = directions.bend(PLANE.spacing)
     held, rest = directions.bent_part(side, PLANE.spacing, bend), directions.rest(side, PLANE.spacing)
     mean = directions.along.mean(axis=2)[0]
