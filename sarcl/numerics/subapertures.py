@@ -126,16 +126,19 @@ def rates(track: PulseGeometry, points: np.ndarray, axes: np.ndarray | None, mos
         if end - begin < 2:
             continue
         rows = begin + spread_over(end - begin - 1, most)
-        change = np.zeros((len(points), len(rows), 3))
+        change = np.zeros((3, len(points), len(rows)))
         for antenna in track.ends:
-            directions = []
-            for r in (rows, rows + 1):
-                d = antenna[r] - points[:, None, :]
-                directions.append(d / np.maximum(np.linalg.norm(d, axis=-1, keepdims=True), 1e-9))
-            change += (directions[1] - directions[0]) / len(track.ends)
-        seen = change if axes is None else change @ axes.T
-        np.maximum(largest, np.linalg.norm(seen, axis=-1).max(axis=1), out=largest)
+            before, after = (_planes_of_directions(antenna[r], points) for r in (rows, rows + 1))
+            change += (after - before) / len(track.ends)
+        seen = change if axes is None else np.moveaxis(np.moveaxis(change, 0, -1) @ axes.T, -1, 0)
+        np.maximum(largest, np.sqrt(sum(plane * plane for plane in seen)).max(axis=1), out=largest)
     return largest
+
+
+def _planes_of_directions(ends: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Components of the unit vectors from points (n, 3) to ends (m, 3): (3, n, m), faster than rows of three."""
+    d = ends.T[:, None] - points.T[:, :, None]
+    return np.asarray(d / np.maximum(np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]), 1e-9))
 
 
 def filter_error(
