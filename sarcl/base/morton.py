@@ -16,8 +16,8 @@ def morton_order(positions: np.ndarray) -> np.ndarray:
 
 
 def order_of_codes(codes: np.ndarray) -> np.ndarray:
-    """Stable order of `morton_codes`, int64 (n,): half as long as np.argsort, because codes are sorted with their numbers
-    in one word, whose room only the last bits of the codes exceed."""
+    """Stable order of `morton_codes`, int64 (n,), in half the time of np.argsort: codes are sorted with numbers in
+    one word, whose room only the last bits of the codes exceed."""
     bits = np.uint64(len(codes).bit_length())
     words = codes >> np.uint64(max(3 * DEPTH + int(bits) - 64, 0)) << bits
     words |= np.arange(len(codes), dtype=np.uint64)
