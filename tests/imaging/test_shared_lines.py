@@ -30,12 +30,12 @@ def wide(request):
     return device.one_lane() if device.info.vector_width > 1 else device
 
 
-def planned(raw, grid, tolerance, *, wrap=False, skip=True, beam=None, on=WIDE, **changes):
-    """A task, its plan by shared lines with some of its fields changed, and the tiling."""
+def planned(raw, grid, tolerance, *, wrap=False, skip=True, beam=None, on=WIDE, **limits):
+    """A task, its plan by shared lines with some of its limits changed, and the tiling."""
     task = make_task(raw, grid, None, None, wrap, skip, beam)
     made = _shared_line_plan.choose(task, tolerance, on)
     assert isinstance(made, SharedLinePlan), "no plan by shared lines meets the tolerance"
-    made = replace(made, **changes)
+    made = replace(made, limits={**made.limits, **limits})
     return task, made, direct.LineTiling(grid, made.side)
 
 

@@ -141,10 +141,11 @@ class GroupCurvature:
         """The same where a bent line's samples are farthest apart."""
         return max((self.step + self.stretch) * 2 * bandwidth / SPEED_OF_LIGHT, LEAST_CELLS)
 
-    def limits(self, bandwidth: float, oversample: float) -> tuple[float, float, float]:
-        """limit_cycles, limit_position and limit_step of a plan with profiles `oversample` times finer than a cell."""
-        sigma = 2 * bandwidth / SPEED_OF_LIGHT * oversample
-        return self.cycles, max(self.off * sigma, LEAST_SHIFT), self.cells(bandwidth) * oversample * LIMIT_SLACK
+    def limits(self, bandwidth: float, oversample: float) -> dict[str, float]:
+        """Limits of a LinePlan with profiles `oversample` times finer than a cell."""
+        position = max(self.off * (2 * bandwidth / SPEED_OF_LIGHT * oversample), LEAST_SHIFT)
+        step = self.cells(bandwidth) * oversample * LIMIT_SLACK
+        return {"limit_cycles": self.cycles, "limit_position": position, "limit_step": step}
 
 
 def curvatures(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ...base.errors import ToleranceUnreachable
@@ -43,10 +44,9 @@ class LinePlan:
     interpolator    interpolator from the range profile, of `length` samples, to the line's profile
     order           order of the range series
     slope           the curvature also shifts the positions of pixels along the line
-    limit_cycles, limit_position, limit_step
-                    a pulse falls back to per-pixel interpolation where its curvature differs from that of its group by
-                    more than limit_cycles cycles or limit_position samples, or its range changes by more than
-                    limit_step samples per pixel along the line
+    limits          of the kernels: a pulse falls back to per-pixel interpolation where its curvature differs from that
+                    of its group by more than limit_cycles cycles or limit_position samples, or its range changes by
+                    more than limit_step samples per pixel along the line
     cost            per contribution, relative to one with linear interpolation and ranges in float32
     """
 
@@ -58,9 +58,7 @@ class LinePlan:
     length: int
     order: int
     slope: bool
-    limit_cycles: float
-    limit_position: float
-    limit_step: float
+    limits: Mapping[str, float]
     predicted_error: float
     cost: float
 
@@ -163,7 +161,6 @@ def _cheapest(
             cost += (profile_cost - cost_model.TAPS[2]) * reads / n_pixels
             if best is not None and cost >= best.cost:
                 continue
-        limit_cycles, limit_position, limit_step = curvature.limits(task.bandwidth, length / n_samples)
         best = LinePlan(
             side=side,
             fine=fine,
@@ -173,9 +170,7 @@ def _cheapest(
             length=length,
             order=order,
             slope=slope,
-            limit_cycles=limit_cycles,
-            limit_position=limit_position,
-            limit_step=limit_step,
+            limits=curvature.limits(task.bandwidth, length / n_samples),
             predicted_error=error + interpolator.error,
             cost=cost,
         )
