@@ -10,7 +10,11 @@ whole    facets with all their physics, whole calls, compared with finufft's spr
 scenes   a million facets x 1024 pulses, and the 512 x 512 scene of Franceschetti et al. 1992 at 1, 4, 9, 16 cells a
          pixel of two facets each; errors from echo's own check
 
-Runs alternate; the shortest counts.
+Runs alternate; the shortest counts. "cpu" of a row are CPU seconds of its calls, "check" the seconds of their checks,
+which no other figure includes. Progress goes to stderr.
+
+This is no part of `sarcl bench`, which measures what verbs take: finufft spreads delays that it is given, pulse by
+pulse, and its partner here is a stage of `echo`, read from the report.
 """
 
 from __future__ import annotations
@@ -108,19 +112,16 @@ def spread(args: argparse.Namespace, document: Row) -> list[Row]:
         peer = None
         for _ in range(args.repeats):
             for tolerance in TOLERANCES:
-                start = time.perf_counter()
-                raw = sarcl.echo(
-                    scene, WAVE, track(args.pulses), tolerance=tolerance, reference=(0, 0, 0), check=False,
-                    device=args.device,
-                )  # fmt: skip
-                call = time.perf_counter() - start
+                say(f"points, {tolerance:.0e}")
+                options = {"tolerance": tolerance, "reference": (0, 0, 0), "check": False, "device": args.device}
+                raw, seconds = called(scene, WAVE, track(args.pulses), **options)
                 if not data:
                     data = sums(raw, positions, amplitudes, exact)
                     np.savez(Path(folder) / "points.npz", **{k: v for k, v in data.items() if k != "exact"})
                 made = np.asarray(raw.samples)[data["pulses"]][:, data["samples"]]
                 error = float(np.linalg.norm(made - data["exact"]) / np.linalg.norm(data["exact"]))
-                seconds = raw.report.seconds["echo"] + raw.report.seconds["spectra"]
-                keep("sarcl, delays from geometry", f"{tolerance:.0e}", seconds, error, call=call)
+                spreading = raw.report.seconds["echo"] + raw.report.seconds["spectra"]
+                keep("sarcl, delays from geometry", f"{tolerance:.0e}", spreading, error, **seconds)
             if args.peer_python and peer is None:
                 peer = Peer(args.peer_python, Path(folder) / "points.npz")
                 document["peers"].append(
@@ -129,6 +130,7 @@ def spread(args: argparse.Namespace, document: Row) -> list[Row]:
                 )  # fmt: skip
             for eps, kind in PEER_SETTINGS if peer else []:
                 assert peer is not None
+                say(f"finufft, {eps:.0e} {kind}")
                 keep("finufft, delays given", f"{eps:.0e} {kind}", *peer.run(eps, kind))
     document["samples"] = int(raw.n_samples)
     return list(best.values())
@@ -178,15 +180,8 @@ def whole(args: argparse.Namespace) -> list[Row]:
     ):
         scene = sarcl.Scene.from_heights(axis, axis, heights, material=material)
         for tolerance in (1e-2, 1e-3):
-            rows = []
-            for i in range(args.repeats):
-                start = time.perf_counter()
-                raw = sarcl.echo(
-                    scene, WAVE, track(args.pulses), tolerance=tolerance, polarization=polarization,
-                    check=i == 0, device=args.device,
-                )  # fmt: skip
-                rows.append((time.perf_counter() - start - raw.report.seconds.get("check", 0.0), raw))
-            out.append(row(name, f"{tolerance:.0e}", rows[0][1], [s for s, _ in rows]))
+            options = {"polarization": polarization, "device": args.device, "at": track(args.pulses)}
+            out.append(timed(name, scene, tolerance, args.repeats, **options))
     return out
 
 
@@ -200,36 +195,47 @@ def scenes(device: Any) -> list[Row]:
         axis = np.linspace(-175, 175, 708)
         heights = 3 * np.sin(axis / 40)[:, None] * np.cos(axis / 55)
         scene = sarcl.Scene.from_heights(axis, axis, heights, material=material)
-        out.append(timed(name, scene, track(1024), 1e-2, device, max_edge=None))
+        out.append(timed(name, scene, 1e-2, at=track(1024), device=device, max_edge=None))
     for cells in (1, 2, 3, 4):
         axis = np.linspace(-128, 128, 512 * cells + 1)
         scene = sarcl.Scene.from_heights(axis, axis, np.zeros((len(axis), len(axis))), material=rough, roughness=0.02)
         wave = sarcl.Waveform.chirp(center=9.6e9, bandwidth=299_792_458.0 / (2 * 0.5 * np.sqrt(0.5)), duration=1e-6)
-        made = timed(
-            f"SARAS, {cells * cells} cells a pixel", scene, track(512), 1e-2, device, wave=wave, max_edge=None,
-        )  # fmt: skip
-        out.append({**made, "vax": SARAS_VAX[cells * cells]})
+        name, options = f"SARAS, {cells * cells} cells a pixel", {"device": device, "wave": wave, "max_edge": None}
+        out.append({**timed(name, scene, 1e-2, at=track(512), **options), "vax": SARAS_VAX[cells * cells]})
     return out
 
 
-def timed(name: str, scene: Any, at: Any, tolerance: float, device: Any, wave: Any = None, **options: Any) -> Row:
-    """One row: a call with its check; the seconds of the check are left out."""
+def timed(
+    name: str, scene: Any, tolerance: float, repeats: int = 1, *, at: Any, wave: Any = None, **options: Any
+) -> Row:
+    """The entries of some calls that the page shows, of which the first is checked."""
+    runs = []
+    for i in range(repeats):
+        say(f"{name}, {tolerance:.0e}")
+        runs.append(called(scene, wave or WAVE, at, tolerance=tolerance, check=i == 0, **options))
+    report, seconds = runs[0][0].report, {key: [one[key] for _, one in runs] for key in runs[0][1]}
+    pairs = report.contributions_done + sum(report.contributions_skipped.values())
+    return {
+        "name": name, "setting": f"{tolerance:.0e}", "pairs": pairs, "error": report.measured_error,
+        "predicted": report.predicted_error, "samples": runs[0][0].n_samples, "plan": dict(report.plan),
+        "stages": dict(report.seconds), **seconds, "seconds": seconds["call"],
+    }  # fmt: skip
+
+
+def called(*subjects: Any, **options: Any) -> tuple[Any, dict[str, float]]:
+    """Echoes; seconds of the call and of its check, apart, and CPU seconds of both."""
     import sarcl
 
-    start = time.perf_counter()
-    raw = sarcl.echo(scene, wave or WAVE, at, tolerance=tolerance, check=True, device=device, **options)
-    seconds = time.perf_counter() - start - raw.report.seconds.get("check", 0.0)
-    return row(name, f"{tolerance:.0e}", raw, [seconds])
+    start, busy = time.perf_counter(), time.process_time()
+    raw = sarcl.echo(*subjects, **options)
+    call, busy = time.perf_counter() - start, time.process_time() - busy
+    check = raw.report.seconds.get("check", 0.0)
+    return raw, {"call": call - check, "check": check, "cpu": busy}
 
 
-def row(name: str, setting: str, raw: Any, seconds: list[float]) -> Row:
-    """The entries of a run that the page shows."""
-    pairs = raw.report.contributions_done + sum(raw.report.contributions_skipped.values())
-    return {
-        "name": name, "setting": setting, "seconds": seconds, "pairs": pairs, "error": raw.report.measured_error,
-        "predicted": raw.report.predicted_error, "samples": raw.n_samples, "plan": dict(raw.report.plan),
-        "stages": dict(raw.report.seconds),
-    }  # fmt: skip
+def say(text: str) -> None:
+    """A line of progress."""
+    print(f"{time.strftime('%H:%M:%S')}  {text}", file=sys.stderr, flush=True)
 
 
 def track(n: int) -> Any:

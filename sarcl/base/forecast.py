@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from math import isnan
@@ -24,7 +25,6 @@ class Forecast(Generic[R_co]):
                      and geometry, in memory or in a file
     predicted_error  bound of the relative error; nan: known only after the run
     error_terms      parts of predicted_error, which is the root of the sum of their squares
-    cheaper          (predicted error, seconds) of the next cheaper plan; None: none, or not searched for
     n_rows, n_samples  of echoes; None for images
     model_error      predicted error of the model itself, which no tolerance bounds; None: it has none, or it is
                      known only after the run
@@ -32,6 +32,7 @@ class Forecast(Generic[R_co]):
     planning         seconds that planning has taken, which `seconds` includes
     run              run() carries out this very plan and returns the verb's result. What was planned from is referred
                      to, not copied: ValueError where a file of it has changed meanwhile
+    search_cheaper   gives `cheaper`
     """
 
     method: str
@@ -41,12 +42,18 @@ class Forecast(Generic[R_co]):
     predicted_error: float
     run: Callable[[], R_co] = field(repr=False)
     error_terms: tuple[ErrorTerm, ...] = ()
-    cheaper: tuple[float, float] | None = None
     n_rows: int | None = None
     n_samples: int | None = None
     model_error: float | None = None
     work: str = ""
     planning: float = 0.0
+    search_cheaper: Callable[[], tuple[float, float] | None] = field(default=lambda: None, repr=False)
+
+    @functools.cached_property
+    def cheaper(self) -> tuple[float, float] | None:
+        """(predicted error, seconds) of the next cheaper plan, which is planned when it is first asked for; None: none,
+        or the verb searches for none."""
+        return self.search_cheaper()
 
     def __str__(self) -> str:
         rows = "" if self.n_rows is None else f"{self.n_rows} rows of {self.n_samples} samples, "

@@ -12,37 +12,30 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from ..base.validation import choice, count, number
+from ..base.validation import choice, count
 from ..imaging.choose_method import METHODS
-from ..opencl.device import DeviceChoice
 from . import _baseline, _cases, _peers, _run_sarcl, tables
 from ._competitor import Absent, Competitor
 from ._measure import Paces, alternate, measure
-from .documents import Document, header, load, opened_devices
+from .documents import Document, Measuring, header, load
 
 TOLERANCES = (1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 1e-5, 1e-6)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Setting:
+class Setting(Measuring):
     """What is measured, and how.
 
-    scenes, data   see `_cases.make`;  sizes  pulses = samples = pixels a side, at least 8
-    tolerances     relative errors, above 0;  methods  "direct", "factorized", "auto"
-    devices        as `sarcl.devices` names them; None: all that work;  no_fp64  measure each again without float64
+    scenes, data   see `_cases.make`;  sizes  pulses = samples = pixels a side
+    methods        "direct", "factorized", "auto"
     peer_python    an interpreter that has fastsar, default this one;  peer_backend  which of its backends
     with_peers     NumPy and fastsar are measured too
-    repeats        runs of each row, in turns;  pixels  number of pixels checked against the exact sum, at least 256
-    limit          s; runs expected to last longer are left out
-    patience       s to wait before each run until no other program runs
-    ValueError for what does not fit.
+    pixels         number of pixels checked against the exact sum, at least 256
     """
 
     scenes: Sequence[str] = _cases.SCENES
     sizes: Sequence[int] = (1024,)
     tolerances: Sequence[float] = TOLERANCES
-    devices: Sequence[DeviceChoice | None] | None = None
-    no_fp64: bool = False
     methods: Sequence[str] = ("direct", "factorized")
     data: str | None = None
     peer_python: str | None = None
@@ -50,25 +43,15 @@ class Setting:
     with_peers: bool = True
     repeats: int = 5
     pixels: int = 1024
-    limit: float = 120.0
-    patience: float = 0.0
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         for scene in self.scenes:
             choice("scene", scene, _cases.SCENES)
         for method in self.methods:
             choice("method", method, METHODS)
-        checked = {
-            "tolerances": [number(f"tolerances[{i}]", t, above=0) for i, t in enumerate(self.tolerances)],
-            "sizes": sorted({count(f"sizes[{i}]", n, least=8) for i, n in enumerate(self.sizes)}),
-            "repeats": count("repeats", self.repeats),
-            "pixels": count("pixels", self.pixels, least=256),
-            "limit": number("limit", self.limit, above=0),
-            "patience": number("patience", self.patience, least=0),
-            "peer_python": _peers.check_python(self.peer_python),
-        }
-        for name, value in checked.items():
-            object.__setattr__(self, name, value)
+        count("pixels", self.pixels, least=256)
+        object.__setattr__(self, "peer_python", _peers.check_python(self.peer_python))
 
 
 def run(
@@ -84,7 +67,7 @@ def run(
     options        those of a Setting. ValueError for what does not fit, before the work; NoDeviceError.
     """
     setting = Setting(**options)
-    opened = opened_devices(setting.devices, setting.no_fp64)
+    opened = setting.opened_devices()
     document: Document = {**header(opened), "cases": []}
     with ExitStack() as stack:
         peer = None
@@ -96,7 +79,7 @@ def run(
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="sarcl-bench-")))
         for scene in setting.scenes:
             paces: Paces = {}
-            for n in setting.sizes:
+            for n in sorted(set(setting.sizes)):
                 progress("data", 0, 1)
                 case = _cases.make(scene, n, setting.data, setting.pixels)
                 _cases.save(case, folder)

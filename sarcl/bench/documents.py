@@ -6,12 +6,14 @@ import json
 import os
 import platform
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..base.threads import threads
+from ..base.validation import count, number
 from ..base.version import __version__
 from ..opencl import device_list
 from ..opencl.choose_device import open_device
@@ -22,12 +24,39 @@ FACTS = ("index", "name", "platform", "driver", "kind", "fp64", "units")  # of a
 Document = dict[str, Any]
 
 
-def opened_devices(devices: Sequence[DeviceChoice | None] | None, no_fp64: bool) -> list[Device]:
-    """The devices, all that work by default, and with no_fp64 a twin without float64 of each that has it."""
-    if not devices:
-        devices = [info.index for info in device_list.devices() if info.works] or [None]
-    opened = [open_device(device) for device in dict.fromkeys(devices)]
-    return opened + [device.without_fp64() for device in opened if no_fp64 and device.info.fp64]
+@dataclass(frozen=True, kw_only=True)
+class Measuring:
+    """How anything is measured.
+
+    sizes, tolerances  of the tasks: at least 8; relative errors, above 0
+    devices   as `sarcl.devices` names them; None: all that work;  no_fp64  measure each again without float64
+    repeats   runs of each row, in turns;  limit  s; runs expected to last longer are left out
+    patience  s to wait before each run until no other program runs
+    ValueError for what does not fit.
+    """
+
+    sizes: Sequence[int] | None = None
+    tolerances: Sequence[float] | None = None
+    devices: Sequence[DeviceChoice | None] | None = None
+    no_fp64: bool = False
+    repeats: int = 3
+    limit: float = 120.0
+    patience: float = 0.0
+
+    def __post_init__(self) -> None:
+        for i, n in enumerate(self.sizes or ()):
+            count(f"sizes[{i}]", n, least=8)
+        for i, tolerance in enumerate(self.tolerances or ()):
+            number(f"tolerances[{i}]", tolerance, above=0)
+        count("repeats", self.repeats)
+        number("limit", self.limit, above=0)
+        number("patience", self.patience, least=0)
+
+    def opened_devices(self) -> list[Device]:
+        """The devices, all that work by default, and with no_fp64 a twin without float64 of each that has it."""
+        devices = self.devices or [info.index for info in device_list.devices() if info.works] or [None]
+        opened = [open_device(device) for device in dict.fromkeys(devices)]
+        return opened + [device.without_fp64() for device in opened if self.no_fp64 and device.info.fp64]
 
 
 def header(devices: Sequence[Device]) -> Document:

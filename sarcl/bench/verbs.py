@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from ..base.validation import choice, count, number
-from ..opencl.device import Device, DeviceChoice
+from ..base.validation import choice
+from ..opencl.device import Device
 from ._competitor import Competitor, Reading
 from ._measure import Paces, measure
 from ._run_sarcl import describe
 from ._verb_cases import TASKS, VerbCase, VerbTask
-from .documents import Document, header, load, opened_devices
+from .documents import Document, Measuring, header, load
 
 QUICK_TOLERANCES = 2  # of the tolerances of a verb, with quick
 QUICK_REPEATS = 1
@@ -25,39 +25,19 @@ NOTHING = np.zeros(0)  # values of a reading whose errors the case has
 
 
 @dataclass(frozen=True, kw_only=True)
-class VerbSetting:
-    """What is measured, and how.
+class VerbSetting(Measuring):
+    """What is measured, and how: sizes and tolerances are by default those of TASKS.
 
-    verbs          names of TASKS, default all;  quick  small tasks, few tolerances, one run: at most 3 CPU minutes
-    sizes          of every verb's task, at least 8, default those of TASKS;  tolerances  default those of TASKS
-    devices        as `sarcl.devices` names them; None: all that work;  no_fp64  measure each again without float64
-    repeats        runs of each row, in turns, after one that is compared with the exact result
-    limit          s; runs expected to last longer are left out
-    patience       s to wait before each run until no other program runs
-    ValueError for what does not fit.
+    verbs  names of TASKS, default all;  quick  small tasks, few tolerances, one run: at most 3 CPU minutes
     """
 
     verbs: Sequence[str] = tuple(TASKS)
     quick: bool = False
-    sizes: Sequence[int] | None = None
-    tolerances: Sequence[float] | None = None
-    devices: Sequence[DeviceChoice | None] | None = None
-    no_fp64: bool = False
-    repeats: int | None = None
-    limit: float = 120.0
-    patience: float = 0.0
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         for verb in self.verbs:
             choice("verb", verb, tuple(TASKS))
-        for i, n in enumerate(self.sizes or ()):
-            count(f"sizes[{i}]", n, least=8)
-        for i, tolerance in enumerate(self.tolerances or ()):
-            number(f"tolerances[{i}]", tolerance, above=0)
-        repeats = (QUICK_REPEATS if self.quick else 3) if self.repeats is None else self.repeats
-        object.__setattr__(self, "repeats", count("repeats", repeats))
-        number("limit", self.limit, above=0)
-        number("patience", self.patience, least=0)
 
     def cases(self) -> Iterator[tuple[VerbTask, VerbCase, Sequence[float]]]:
         """Each task with its cases in growing size, and the tolerances they are measured at."""
@@ -82,8 +62,8 @@ def run(
     """
     from . import tables
 
-    setting = VerbSetting(**options)
-    devices = opened_devices(setting.devices, setting.no_fp64)
+    setting = VerbSetting(**({"repeats": QUICK_REPEATS} if options.get("quick") else {}) | options)
+    devices = setting.opened_devices()
     document: Document = {**header(devices), "kind": "verbs", "cases": []}
     for line in tables.machine_text(document):
         say(line)
@@ -92,7 +72,7 @@ def run(
         rows = measure(
             case,
             list(competitors(task, case, devices, tolerances)),
-            repeats=setting.repeats or QUICK_REPEATS,
+            repeats=setting.repeats,
             limit=setting.limit,
             paces=paces.setdefault(case.scene, {}),
             patience=setting.patience,

@@ -25,8 +25,7 @@ from ..model.phase_history import PhaseHistory
 from ..model.trajectory import Trajectory
 from ..numerics.pulse_geometry import PulseGeometry
 from ..opencl.device import Buffer, Device
-from ..scattering.antenna_weight_error import ANGLE, PATTERN
-from ..scattering.antenna_weights import AntennaWeights
+from ..scattering.antenna_weights import ANGLE, PATTERN, AntennaWeights
 
 if TYPE_CHECKING:
     from .focusing_task import FocusingTask

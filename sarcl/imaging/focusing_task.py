@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+import functools
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
-from typing import Literal
+from typing import Concatenate, Literal, ParamSpec, TypeVar
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -78,12 +80,12 @@ class FocusingTask:
         off = 6e-8 * radius * float(np.hypot(min(sine + angle, 2.0), min(angle, 2.0)))
         return bool(off <= BEAM_EDGE * distance * max(sine, BEAM_EDGE))
 
-    @property
+    @functools.cached_property
     def highest(self) -> float:
         """Upper bound of the frequencies, Hz."""
         return float((self.raw.frequency + self.raw.n_samples * self.raw.frequency_step).max())
 
-    @property
+    @functools.cached_property
     def bandwidth(self) -> float:
         """Largest bandwidth of a row, Hz."""
         return float(self.raw.bandwidth.max())
@@ -97,6 +99,27 @@ class FocusingTask:
     def pairs(self) -> int:
         """Number of (row, pixel) pairs of these rows."""
         return self.raw.n_rows * self.grid.size
+
+
+Others = ParamSpec("Others")
+Result = TypeVar("Result")
+
+
+def per_task(
+    compute: Callable[Concatenate[FocusingTask, Others], Result],
+) -> Callable[Concatenate[FocusingTask, Others], Result]:
+    """Decorator of a function of a task and other arguments, all hashable and by position: its results are kept with
+    the task, because several plans are made for it."""
+    results: WeakKeyDictionary[FocusingTask, dict[object, Result]] = WeakKeyDictionary()
+
+    @functools.wraps(compute)
+    def kept(task: FocusingTask, *others: Others.args, **named: Others.kwargs) -> Result:
+        known = results.setdefault(task, {})
+        if others not in known:
+            known[others] = compute(task, *others, **named)
+        return known[others]
+
+    return kept
 
 
 def beam_of(raw: PhaseHistory, beam: object, center: np.ndarray) -> tuple[np.ndarray | None, float]:

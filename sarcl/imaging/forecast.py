@@ -48,7 +48,6 @@ def forecast_of(
         details["pixels outside every range window"] = unseen.describe()
         if unseen.warning():
             warn(unseen.warning())
-    cheaper = _cheaper(task, options, devices, chosen, seconds, besides)
     return Forecast(
         method=chosen.method,
         plan=details,
@@ -56,7 +55,7 @@ def forecast_of(
         bytes=float(task.grid.size) * np.dtype(chosen.dtype).itemsize + working,
         predicted_error=chosen.predicted_error,
         error_terms=chosen.error_terms,
-        cheaper=cheaper,
+        search_cheaper=lambda: _cheaper(task, options, devices, chosen, seconds, besides),
         planning=planning,
         run=run,
     )

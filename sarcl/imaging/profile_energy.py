@@ -5,9 +5,8 @@ Interpolation and rounding errors are proportional to the former; the tolerance 
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass, field
-from functools import cached_property
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -18,7 +17,7 @@ from ..numerics import interpolator_choice, range_profiles
 from ..numerics.interpolation import deconvolved
 from ..numerics.pulse_geometry import half_path
 from ..opencl import fft
-from .focusing_task import FocusingTask
+from .focusing_task import FocusingTask, per_task
 
 FAINTEST = 1e-20  # share of the power beside the pixels, taken where every pixel is at an exact null of every row
 ROWS, PIXELS, MOST = 16, 256, 2**18  # rows and pixels in the estimate; samples at most
@@ -29,10 +28,6 @@ TAPS, FINER, TERMS = 12, 4.0, 6  # taps, oversampling and terms of an interpolat
 CHANCE, CHANCE_OF_FEW = 1.25, 1.12  # what noise in many pixels makes of `near`, which is 1
 INNER = 0.5  # share of a kernel's largest error that most kernels keep to in the inner half of the band
 BESIDE = TAPS + 2  # samples beside a pixel: those that an interpolation reads, and one more on each side
-
-
-_norms: WeakKeyDictionary[FocusingTask, np.ndarray] = WeakKeyDictionary()  # several plans are made for a task
-_known: WeakKeyDictionary[FocusingTask, ProfileEnergy] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,19 +61,13 @@ class ProfileEnergy:
         return max(self.darkness(n) for n in (0, *interpolator_choice.lengths(n_samples)))
 
 
+@per_task
 def estimate(task: FocusingTask) -> ProfileEnergy:
     """Estimate from 256 pixels in 16 rows spread over the data and in the 16 strongest rows, to 1e-11 of an amplitude.
 
     Up to 64 rows are all read, unless they have more than 2^18 samples.
     ProfileEnergy(1, 1) where none of these pixels lies in the range window and beam of any row.
     """
-    if task not in _known:
-        _known[task] = _estimate(task)
-    return _known[task]
-
-
-def _estimate(task: FocusingTask) -> ProfileEnergy:
-    """See `estimate`."""
     raw, grid = task.raw, task.grid
     bright = row_norms(task)
     few = raw.n_rows <= min(FEW, MOST // raw.n_samples)
@@ -91,25 +80,25 @@ def _estimate(task: FocusingTask) -> ProfileEnergy:
     read = {r: raw.read(r, r + 1)[0] * (task.sample_weight * task.row_weight[r]) for r in stands_for}
     scale = max(1e-290, *(float(np.abs(samples).max()) for samples in read.values()))  # squares must not overflow
     n = raw.n_samples
-    k = np.arange(n) - n // 2
     length = fft.good_length(max(4 * n, 48))
-    shaped = 1 / deconvolved(TAPS, FINER, TERMS, np.float64).transform(k / length)
     pixel_power = near = pixels_inside = 0.0
     together = RowsInPhase.of(raw.n_rows, len(x), BESIDE) if few else None
-    for row, samples in read.items():
-        delays, inside = _delays(task, x, row)
-        gains = None if task.antenna is None else task.antenna.weights(x[inside], row, task.antenna.frequency)
-        values, about, beside = _values(samples / scale, shaped, length, delays[inside])
-        power, close = np.abs(values) ** 2, (np.abs(about) ** 2).mean(axis=1)
-        if gains is not None:
-            power, close = power * np.abs(gains) ** 2, close * np.abs(gains) ** 2
-        pixel_power += stands_for[row] * float(power.sum())
-        near += stands_for[row] * float(close.sum())
-        pixels_inside += stands_for[row] * int(inside.sum()) / raw.n_rows
-        if together is not None:
-            cycles = delays * (raw.frequency[row] / raw.frequency_step[row] + n // 2)
-            factors = np.exp(2j * np.pi * (cycles[inside] % 1)) * (1.0 if gains is None else gains.conj())
-            together.add(row, inside, delays, factors * values, factors[:, None] * beside)
+    at_once = max(1, MOST // length)
+    for rows in (list(read)[start : start + at_once] for start in range(0, len(read), at_once)):
+        all_delays, all_inside = _delays(task, x, np.array(rows))
+        each = _values(np.stack([read[row] / scale for row in rows]), length, all_delays, few)
+        for row, delays, inside, values, around, beside in zip(rows, all_delays, all_inside, *each, strict=True):
+            power, close = np.abs(values[inside]) ** 2, around[inside]
+            gains = None if task.antenna is None else task.antenna.weights(x[inside], row, task.antenna.frequency)
+            if gains is not None:
+                power, close = power * np.abs(gains) ** 2, close * np.abs(gains) ** 2
+            pixel_power += stands_for[row] * float(power.sum())
+            near += stands_for[row] * float(close.sum())
+            pixels_inside += stands_for[row] * int(inside.sum()) / raw.n_rows
+            if together is not None:
+                cycles = delays * (raw.frequency[row] / raw.frequency_step[row] + n // 2)
+                factors = np.exp(2j * np.pi * (cycles[inside] % 1)) * (1.0 if gains is None else gains.conj())
+                together.add(row, inside, delays, factors * values[inside], factors[:, None] * beside[inside])
     peak = 1.0 if task.antenna is None else task.antenna.peak
     total_power = pixels_inside * float(((bright / scale) ** 2).sum()) * peak**2
     if total_power == 0 or near == 0:
@@ -120,13 +109,12 @@ def _estimate(task: FocusingTask) -> ProfileEnergy:
     )
 
 
+@per_task
 def row_norms(task: FocusingTask) -> np.ndarray:
     """Norm of the samples of each row with their weights, (n_rows,) float64.
 
     Of more than 2^28 samples (2 GiB), only every n-th row is read, and its norm is used up to the next one.
     """
-    if task in _norms:
-        return _norms[task]
     raw = task.raw
     every = -(-raw.n_rows * raw.n_samples // ALL)
     weight, out = np.repeat(task.sample_weight**2, 2), np.empty(raw.n_rows)
@@ -136,8 +124,7 @@ def row_norms(task: FocusingTask) -> np.ndarray:
         samples = np.ascontiguousarray(raw.read(start, min(start + step, raw.n_rows)))
         norm = np.concatenate([_weighted_norms(samples[at : at + at_once], weight) for at in range(0, step, at_once)])
         out[start : start + step * every] = norm if every == 1 else norm[0]
-    _norms[task] = out * task.row_weight
-    return _norms[task]
+    return out * task.row_weight
 
 
 def _weighted_norms(samples: np.ndarray, weight: np.ndarray) -> np.ndarray:
@@ -156,42 +143,56 @@ def _weighted_norms(samples: np.ndarray, weight: np.ndarray) -> np.ndarray:
 def share(task: FocusingTask) -> float:
     """Share of (row, pixel) pairs in the row's range window and beam, estimated from 64 rows and 256 pixels."""
     _, x = task.grid.sample(PIXELS, seed=1)
-    rows = spread_over(task.raw.n_rows, 64)
-    return float(np.mean([_delays(task, x, int(row))[1].mean() for row in rows]))
+    return float(_delays(task, x, spread_over(task.raw.n_rows, 64))[1].mean())
 
 
-def _delays(task: FocusingTask, x: np.ndarray, row: int) -> tuple[np.ndarray, np.ndarray]:
-    """Delays of points, m (m, 3), in fractions of a row's range window; whether they lie in it and in the beam."""
-    raw = task.raw
-    half = half_path(raw.tx[row], raw.rx[row], x)
-    delays = 2 * raw.frequency_step[row] / SPEED_OF_LIGHT * (half - raw.reference_range[row])
-    seen = np.full(len(x), True) if task.wrap else np.abs(delays) <= 0.5
+def _delays(task: FocusingTask, x: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Delays of points, m (m, 3), in fractions of the range windows of rows; whether they lie in them and in the beam:
+    (n, m) each."""
+    raw, tx = task.raw, task.raw.tx[rows][:, None]
+    half = half_path(tx, tx if task.antennas.is_monostatic else raw.rx[rows][:, None], x)
+    delays = (2 * raw.frequency_step[rows] / SPEED_OF_LIGHT)[:, None] * (half - raw.reference_range[rows][:, None])
+    seen = np.full(delays.shape, True) if task.wrap else np.abs(delays) <= 0.5
     if task.antennas.beam is not None:
-        seen &= task.antennas.beam_depth(x, row) >= 0
+        seen &= np.stack([task.antennas.beam_depth(x, row) >= 0 for row in rows])
     return delays, seen
 
 
 def _values(
-    samples: np.ndarray, shaped: np.ndarray, length: int, delays: np.ndarray
+    samples: np.ndarray, length: int, delays: np.ndarray, with_neighbours: bool
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Values of a profile at delays (m,), in fractions of the window; its samples about each, and its values as far
-    from each as samples lie apart, frequencies weighted by `_edge_weights`: (m, BESIDE) each.
+    """Values of the profiles of rows at delays (n, m), in fractions of the window; mean power of the BESIDE samples
+    about each (n, m); and values as far from each as samples lie apart, frequencies weighted by `_edge_weights`:
+    (n, m, BESIDE), or (n, 0) without neighbours.
 
-    shaped  (n_samples,): what makes up for the kernel's transform
+    samples  (n, n_samples);  length  of the profiles
     """
-    kernel = deconvolved(TAPS, FINER, TERMS, np.float64)
-    weights = np.stack([shaped, np.ones(len(samples)), shaped * _edge_weights(len(samples))])
-    profile, plain, weighted = range_profiles.from_samples(
-        None, samples[None], weights, length, dtype=np.complex128, n_rows=1
-    )
+    kernel, n_samples = deconvolved(TAPS, FINER, TERMS, np.float64), samples.shape[1]
+    shaped = _inverse_transform(n_samples, length)
     place = delays * length - (kernel.taps - 1) / 2
     first = np.rint(place).astype(np.int64)
-    taps = (first[:, None] + np.arange(kernel.taps)) % length
-    shares = kernel.weights(place - first)
-    values = (shares * profile[taps]).sum(axis=1)
-    read = weighted[(first[:, None] + np.arange(-BESIDE // 2, BESIDE // 2 + kernel.taps - 1)) % length]
-    beside = sliding_window_view(read, kernel.taps, axis=1) @ shares[:, :, None]
-    return values, plain[(first[:, None] + np.arange(-1, BESIDE - 1)) % length], beside[..., 0]
+    shares, first = kernel.weights(place - first), first[..., None]
+
+    def profiles(weights: np.ndarray | float, begin: int, count: int) -> np.ndarray:
+        """Samples begin ... begin + count - 1 about each delay (n, m, count), of rows times weights (n_samples,)."""
+        rows = range_profiles.from_samples(None, samples, weights, length, dtype=np.complex128, n_rows=1)
+        return np.asarray(rows[np.arange(len(rows))[:, None, None], (first + np.arange(begin, begin + count)) % length])
+
+    values = (shares * profiles(shaped, 0, kernel.taps)).sum(axis=-1)
+    around = (np.abs(profiles(1.0, -1, BESIDE)) ** 2).mean(axis=-1)
+    if not with_neighbours:
+        return values, around, np.empty((len(values), 0))
+    read = profiles(shaped * _edge_weights(n_samples), -BESIDE // 2, BESIDE + kernel.taps - 1)
+    return values, around, (sliding_window_view(read, kernel.taps, axis=-1) @ shares[..., None])[..., 0]
+
+
+@functools.lru_cache(maxsize=16)
+def _inverse_transform(n_samples: int, length: int) -> np.ndarray:
+    """Factors of spectra (n_samples,) that make up for the kernel of `_values`."""
+    k = np.arange(n_samples) - n_samples // 2
+    factors = 1 / deconvolved(TAPS, FINER, TERMS, np.float64).transform(k / length)
+    factors.flags.writeable = False
+    return np.asarray(factors)
 
 
 def _edge_weights(n: int) -> np.ndarray:
@@ -266,7 +267,7 @@ class RowsInPhase:
             self._known[length] = float(np.sqrt(power / self._power))
         return self._known[length]
 
-    @cached_property
+    @functools.cached_property
     def _power(self) -> float:
         """Of the pixels."""
         in_phase = float((np.abs(self.values.sum(axis=0)) ** 2).sum())

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
 from ..opencl import fft
@@ -32,10 +34,13 @@ def padding(interpolator: Interpolator) -> int:
     return interpolator.taps + (4 if interpolator.dtype == np.float64 else 2)
 
 
+@functools.lru_cache(maxsize=16)
 def correction(interpolator: Interpolator, n_samples: int, length: int) -> np.ndarray:
     """Factors of spectra (n_samples,): 1/transform, and the sign that puts delay 0 at length/2."""
     k = np.arange(n_samples) - n_samples // 2
-    return np.where(k % 2, -1.0, 1.0) / interpolator.transform(k / length)
+    factors = np.where(k % 2, -1.0, 1.0) / interpolator.transform(k / length)
+    factors.flags.writeable = False
+    return factors
 
 
 def from_samples(

@@ -20,15 +20,13 @@ from ..numerics.polynomials import chebyshev
 from ..scene.scene import Scene
 from ..scene.triangles import areas, centroids
 from ._facet_sampling import drawn, facets_at
-from .antenna_weights import MOST_NODES, AntennaWeights, WeightError
+from .antenna_weights import ANGLE, MOST_NODES, PATTERN, AntennaWeights, WeightError
 from .facets import FacetSet
 
 # Errors are estimated from samples. (Weights are compared at a facet's corner, twice as far from the centroid as the
 # rms radius of the facet.)
 SAFETY = 2.0
 PULSES, FACETS, POINTS = 32, 400, 200
-ANGLE = 1e-7  # rad, bound of the rms error of float32 directions: 1e-8 to 3e-8 measured
-PATTERN = 1e-6  # bound of the rms error of float32 patterns relative to their peak: 1e-7 to 5e-7 measured
 STEP = 1e-4  # rad, of the differences that approximate derivatives
 
 

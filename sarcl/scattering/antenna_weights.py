@@ -23,6 +23,8 @@ from ..opencl.device import Device
 if TYPE_CHECKING:
     from ..opencl.device import Buffer
 
+ANGLE = 1e-7  # rad, bound of the rms error of float32 directions: 1e-8 to 3e-8 measured
+PATTERN = 1e-6  # bound of the rms error of float32 patterns relative to their peak: 1e-7 to 5e-7 measured
 MOST_NODES = 16  # frequencies, Chebyshev nodes over the band
 # of a tolerance: the most that rounding of gains in float32 may take, and with it their interpolation over the band
 ROUNDING, OVER_BAND = 0.3, 0.7

@@ -61,6 +61,8 @@ def points_of(scene: Scene, skips: set[str], n_pulses: int) -> tuple[Points | No
     """The scene's points, and counts of pairs of point and pulse that are left out: reason -> count."""
     keep = scene.amplitudes != 0 if "zero reflectivity" in skips else np.ones(len(scene.positions), bool)
     left_out = {"zero reflectivity": int((~keep).sum()) * n_pulses}
+    if len(keep) and keep.all():
+        return Points(scene.positions, scene.amplitudes), left_out
     return Points(scene.positions[keep], scene.amplitudes[keep]) if keep.any() else None, left_out
 
 

@@ -44,12 +44,14 @@ def refuse_unseen(
     if weights.pair is None and not gated:
         return
     bounds = _Bounds(weights, waveform, antennas, gated, margin + HEIGHTS * float(scene.roughness.max(initial=0.0)))
-    places = np.concatenate([scene.positions, centroids(scene.triangles)])
+    places = scene.positions
+    if len(scene.triangles):
+        places = np.concatenate([places, centroids(scene.triangles)])
     few = places[spread_over(len(places), SAMPLES)]
     pulses = spread_over(len(antennas), SAMPLES)
-    whole = box(np.concatenate([scene.positions, scene.triangles.reshape(-1, 3)]))
     if not len(few) or np.logical_and(*bounds.may_see(few[:, None], pulses)).any():
         return
+    whole = box(np.concatenate([scene.positions, scene.triangles.reshape(-1, 3)]))
     ever_in_window = ever_in_beam = False
     cells: np.ndarray | None = None
     for start in range(0, len(antennas), PULSES):

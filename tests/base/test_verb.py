@@ -133,7 +133,7 @@ def test_a_forecast_says_what_it_is_about():
     forecast = Forecast("direct", {"taps": 4}, 2.0, 3e9, 2e-4, lambda: "image", (ErrorTerm("taps", 2e-4, "more"),))
     assert str(forecast) == "direct: about 2 s, 3 GB, error below 2.0e-04"
     assert "run=" not in repr(forecast) and forecast.run() == "image"
-    rows = Forecast("direct", {}, 2.0, 3e9, 2e-4, str, n_rows=5, n_samples=7, cheaper=(1e-3, 0.5))
+    rows = Forecast("direct", {}, 2.0, 3e9, 2e-4, str, n_rows=5, n_samples=7, search_cheaper=lambda: (1e-3, 0.5))
     assert str(rows) == (
         "direct: 5 rows of 7 samples, about 2 s, 3 GB, error below 2.0e-04 (next cheaper plan: 1.0e-03 in 0.5 s)"
     )

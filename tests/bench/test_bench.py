@@ -413,7 +413,7 @@ def test_echo_documents_become_tables(tmp_path):
     spread = [
         {
             "name": "sarcl, delays from geometry", "setting": "1e-03", "seconds": [0.5, 0.4], "error": 2e-4,
-            "call": [1, 0.8],
+            "call": [1, 0.8], "cpu": [1.5, 1.3],
         },
         {"name": "finufft, delays given", "setting": "1e-03 complex64", "seconds": [1.0, 1.2], "error": 7e-4},
     ]  # fmt: skip
@@ -430,9 +430,9 @@ def test_echo_documents_become_tables(tmp_path):
     documents.write(document, tmp_path / "results" / "2-echo.json")
     page.write(tmp_path / "results", tmp_path)
     text = (tmp_path / "results_echoes.md").read_text()
-    assert "| sarcl, delays from geometry | 1e-03 | 2.0e-04 | 0.4 | 100 | 80 | 50 |" in text
+    assert "| sarcl, delays from geometry | 1e-03 | 2.0e-04 | 0.4 | 100 | 80 | 50 | 1.3 |" in text
     assert "| 1e-03 complex64 | 7.0e-04 | 1e-03 | 2.0e-04 | 2.50 x | 2.40 x |" in text
-    assert "| metal | 1e-02 | 1.0e-03 | 8.0e-03 | 2 | 2.0 | 0.05 x its rate |" in text
+    assert "| metal | 1e-02 | 1.0e-03 | 8.0e-03 | 2 |  | 2.0 | 0.05 x its rate |" in text
     assert "| SARAS | 1e-02 | 1.0e-03 | 5e+06 | 7 | 9 | 490 |" in text
 
 

@@ -30,12 +30,12 @@ def wide(request):
     return device.one_lane() if device.info.vector_width > 1 else device
 
 
-def planned(raw, grid, tolerance, *, wrap=False, skip=True, beam=None, on=WIDE, **changes):
-    """A task, its plan by shared lines with some of its fields changed, and the tiling."""
+def planned(raw, grid, tolerance, *, wrap=False, skip=True, beam=None, on=WIDE, **limits):
+    """A task, its plan by shared lines with some of its limits changed, and the tiling."""
     task = make_task(raw, grid, None, None, wrap, skip, beam)
     made = _shared_line_plan.choose(task, tolerance, on)
     assert isinstance(made, SharedLinePlan), "no plan by shared lines meets the tolerance"
-    made = replace(made, **changes)
+    made = replace(made, limits={**made.limits, **limits})
     return task, made, direct.LineTiling(grid, made.side)
 
 
@@ -223,7 +223,7 @@ def test_the_profile_of_a_line_holds_its_curvature(squint, left, bistatic):
     raw = spaceborne(n_rows=9, squint=squint, bistatic=bistatic)
     antennas, side = make_task(raw, PLANE, None, None, False, True).antennas, 64
     steps = _line_curvature.steps(sarcl.ImageGrid.plane(shape=(64, 64), spacing=PLANE.spacing))
-    directions = _line_curvature.SampledDirections.at(np.zeros((1, 3)), antennas.tx, antennas.rx, steps)
+    directions = _line_curvature.SampledDirections.at(np.zeros((1, 3)), antennas.ends, steps)
     bend = directions.bend(PLANE.spacing)
     held, rest = directions.bent_part(side, PLANE.spacing, bend), directions.rest(side, PLANE.spacing)
     mean = directions.along.mean(axis=2)[0]

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import itertools
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -73,3 +75,37 @@ def test_few_rows_and_many_are_transformed_alike(dtype, inverse):
     many = fft.rows(None, data, inverse=inverse, engine="scipy")
     assert few.dtype == many.dtype == dtype
     assert np.linalg.norm(few - many) <= (4e-7 if dtype == np.complex64 else 1e-15) * np.linalg.norm(many)
+
+
+@pytest.mark.parametrize("dtype", [np.complex64, np.complex128])
+@pytest.mark.parametrize("inverse", [False, True])
+def test_many_rows_have_the_bits_of_scipy_fft(dtype, inverse):
+    import scipy.fft
+
+    data = noise(40, 99).astype(dtype)
+    wanted = scipy.fft.ifft(data, norm="forward") if inverse else scipy.fft.fft(data)
+    np.testing.assert_array_equal(fft.rows(None, data, inverse=inverse, engine="scipy"), wanted)
+    buffer = data.copy()
+    np.testing.assert_array_equal(fft.rows(None, buffer, inverse=inverse, engine="scipy", overwrite=True), wanted)
+
+
+PROCESS = """
+import sys
+from importlib.machinery import PathFinder
+import numpy as np
+from sarcl.opencl import fft
+find_spec = PathFinder.find_spec
+if sys.argv[1] == "elsewhere":
+    PathFinder.find_spec = lambda name, *others: None if name == "pypocketfft" else find_spec(name, *others)
+data = np.exp(1j * np.arange(4000).reshape(40, 100) ** 2).astype(np.complex64)
+forward, inverse = fft.rows(None, data), fft.rows(None, data, inverse=True)
+assert ("scipy.special" in sys.modules) == (sys.argv[1] == "elsewhere")
+import scipy.fft
+assert (forward == scipy.fft.fft(data)).all()
+assert (inverse == scipy.fft.ifft(data, norm="forward")).all()
+"""
+
+
+@pytest.mark.parametrize("extension", ["in its place", "elsewhere"])
+def test_scipy_fft_is_imported_only_where_its_extension_is_elsewhere(extension):
+    subprocess.run([sys.executable, "-c", PROCESS, extension], check=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from ...base.constants import SPEED_OF_LIGHT
 from ...base.rows import spread_over
 from ...model.image_grid import ImageGrid
 from ...numerics.pulse_geometry import PulseGeometry
-from ..focusing_task import FocusingTask
+from ..focusing_task import FocusingTask, per_task
 from ..tiling.plane import outline
 
 LEAST_CELLS = 1e-30  # resolution cells per pixel; as LEAST_STEP of kernels/backproject_lines.cl
@@ -38,17 +38,17 @@ EDGE = np.array([[-1, 0, 1, 1, -1], [1, 1, 1, -1, -1]])
 class SampledDirections:
     """Geometry of sampled tiles and pulses.
 
-    along    components of the steps between pixels along the lines of sight, m (tiles, n, 2 antennas, 2)
-    inverse  inverse distances from the antennas, 1/m (tiles, n, 2)
+    along    components of the steps between pixels along the lines of sight, m (tiles, n, antennas, 2)
+    inverse  inverse distances from the antennas, 1/m (tiles, n, antennas)
     """
 
     along: np.ndarray
     inverse: np.ndarray
 
     @classmethod
-    def at(cls, points: np.ndarray, tx: np.ndarray, rx: np.ndarray, axes: np.ndarray) -> SampledDirections:
-        ends = np.stack([tx, rx], axis=1)
-        d = ends - points[:, None, None, :]
+    def at(cls, points: np.ndarray, ends: Sequence[np.ndarray], axes: np.ndarray) -> SampledDirections:
+        """Tiles about points, m (tiles, 3); ends  positions of each distinct antenna, m (n, 3)."""
+        d = np.stack(ends, axis=1) - points[:, None, None, :]
         inverse = 1 / np.maximum(np.linalg.norm(d, axis=-1), 1e-3)
         return cls(np.einsum("tnac,kc->tnak", d * inverse[..., None], axes), inverse)
 
@@ -141,10 +141,11 @@ class GroupCurvature:
         """The same where a bent line's samples are farthest apart."""
         return max((self.step + self.stretch) * 2 * bandwidth / SPEED_OF_LIGHT, LEAST_CELLS)
 
-    def limits(self, bandwidth: float, oversample: float) -> tuple[float, float, float]:
-        """limit_cycles, limit_position and limit_step of a plan with profiles `oversample` times finer than a cell."""
-        sigma = 2 * bandwidth / SPEED_OF_LIGHT * oversample
-        return self.cycles, max(self.off * sigma, LEAST_SHIFT), self.cells(bandwidth) * oversample * LIMIT_SLACK
+    def limits(self, bandwidth: float, oversample: float) -> dict[str, float]:
+        """Limits of a LinePlan with profiles `oversample` times finer than a cell."""
+        position = max(self.off * (2 * bandwidth / SPEED_OF_LIGHT * oversample), LEAST_SHIFT)
+        step = self.cells(bandwidth) * oversample * LIMIT_SLACK
+        return {"limit_cycles": self.cycles, "limit_position": position, "limit_step": step}
 
 
 def curvatures(
@@ -156,42 +157,45 @@ def curvatures(
     """
     grid, distance = task.grid, antennas.distance(task.grid.bounds)
     assert grid.spacing is not None
-    points, least = outline(grid), min(side for side, _ in tiles)
+    least = min(side for side, _ in tiles)
     for side, group in tiles:
         is_too_near = 2 * side * float(np.hypot(*grid.spacing)) > distance
         if not is_too_near and (side <= least or min(grid.shape) > side / 2):
-            yield _curvature(task, antennas, points, (side, group), distance, is_bent)
+            unit = _curvature(task, antennas, group, is_bent)
+            yield replace(
+                unit,
+                side=side,
+                radius=side * unit.radius,
+                distance=distance,
+                # paths in a tile are quadratic forms of the places of its pixels
+                cycles=side**2 * unit.cycles,
+                off=side**2 * unit.off,
+                stretch=side * unit.stretch,
+            )
 
 
-def _curvature(
-    task: FocusingTask,
-    antennas: PulseGeometry,
-    points: np.ndarray,
-    tile: tuple[int, int],
-    distance: float,
-    is_bent: bool,
-) -> GroupCurvature:
-    """The curvature in tiles about `points`, m (n, 3), of one side and number of pulses per group."""
-    (side, group), grid = tile, task.grid
+@per_task
+def _curvature(task: FocusingTask, antennas: PulseGeometry, group: int, is_bent: bool) -> GroupCurvature:
+    """The curvature in tiles of one pixel, for so many pulses per group."""
+    grid, points, n_rows = task.grid, outline(task.grid), len(antennas.tx)
     assert grid.spacing is not None
-    n_rows = len(antennas.tx)
     starts = sampled_groups(n_rows, group)
     rows = np.minimum(starts[:, None] + np.arange(0, group + 1, group // 4), n_rows - 1).ravel()
-    directions = SampledDirections.at(points, antennas.tx[rows], antennas.rx[rows], steps(grid))
-    rest = directions.rest(side, grid.spacing).reshape(len(points), len(starts), -1, 5)
+    directions = SampledDirections.at(points, [end[rows] for end in antennas.ends], steps(grid))
+    rest = directions.rest(1, grid.spacing).reshape(len(points), len(starts), -1, 5)
     kappa = 2 * task.highest / SPEED_OF_LIGHT
     cycles = CYCLES_MARGIN * kappa * float(np.abs(rest - rest[:, :, 2:3]).max())
     stretch = 0.0
     if is_bent:
         bend = directions.bend(grid.spacing).reshape(len(points), len(starts), -1)
         bend = np.repeat(bend[:, :, 2:3], rest.shape[2], axis=2)
-        rest = rest - directions.bent_part(side, grid.spacing, bend.reshape(len(points), -1)).reshape(rest.shape)
-        stretch = 2 * REACH * side * float(np.abs(bend).max())
+        rest = rest - directions.bent_part(1, grid.spacing, bend.reshape(len(points), -1)).reshape(rest.shape)
+        stretch = 2 * REACH * float(np.abs(bend).max())
     return GroupCurvature(
-        side=side,
-        radius=side / 2 * float(np.hypot(*grid.spacing)),
+        side=1,
+        radius=float(np.hypot(*grid.spacing)) / 2,
         group=group,
-        distance=distance,
+        distance=0.0,
         cycles=cycles,
         off=SHIFT_MARGIN * unmodelled_shift(rest),
         step=directions.largest_step() * STEP_MARGIN,

@@ -112,7 +112,6 @@ def _plans(
             continue
         interpolator, length, _ = choice
         cost = cost_model.shared_lines(side, fine, taps, slope_taps, group, interpolator.taps, line_samples)
-        limit_cycles, limit_position, limit_step = curvature.limits(task.bandwidth, length / n_samples)
         yield SharedLinePlan(
             side=side,
             fine=fine,
@@ -122,9 +121,7 @@ def _plans(
             length=length,
             order=order,
             slope=slopes is not None,
-            limit_cycles=limit_cycles,
-            limit_position=limit_position,
-            limit_step=limit_step,
+            limits=curvature.limits(task.bandwidth, length / n_samples),
             predicted_error=error + interpolator.error,
             cost=cost + cost_model.profile(length) / n_pixels,
             slopes=slopes,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ...base.errors import ToleranceUnreachable
@@ -44,10 +44,9 @@ class LinePlan:
     interpolator    interpolator from the range profile, of `length` samples, to the line's profile
     order           order of the range series
     slope           the curvature also shifts the positions of pixels along the line
-    limit_cycles, limit_position, limit_step
-                    a pulse falls back to per-pixel interpolation where its curvature differs from that of its group by
-                    more than limit_cycles cycles or limit_position samples, or its range changes by more than
-                    limit_step samples per pixel along the line
+    limits          of the kernels: a pulse falls back to per-pixel interpolation where its curvature differs from that
+                    of its group by more than limit_cycles cycles or limit_position samples, or its range changes by
+                    more than limit_step samples per pixel along the line
     cost            per contribution, relative to one with linear interpolation and ranges in float32
     """
 
@@ -59,9 +58,7 @@ class LinePlan:
     length: int
     order: int
     slope: bool
-    limit_cycles: float
-    limit_position: float
-    limit_step: float
+    limits: Mapping[str, float]
     predicted_error: float
     cost: float
 
@@ -115,35 +112,42 @@ def choose(
     sides     sides of tiles to choose from, pixels
     """
     tiles = [(side, group) for side in sides for group in GROUP_SIZES if side * group <= MOST_LINES]
-    plans = (
-        plan for curvature in curvatures(task, antennas, tiles) for plan in _plans(task, tolerance, curvature, source)
-    )
-    return min(plans, key=lambda plan: plan.cost, default=None)
+    best: LinePlan | None = None
+    for curvature in curvatures(task, antennas, tiles):
+        best = _cheapest(task, tolerance, curvature, source, best)
+    return best
 
 
-def _plans(
-    task: FocusingTask, tolerance: float, curvature: GroupCurvature, source: tuple[Interpolator, int] | None
-) -> Iterator[LinePlan]:
-    """Plans for one side of tiles and number of pulses per group, whose predicted errors are at most `tolerance`."""
+def _cheapest(
+    task: FocusingTask,
+    tolerance: float,
+    curvature: GroupCurvature,
+    source: tuple[Interpolator, int] | None,
+    best: LinePlan | None,
+) -> LinePlan | None:
+    """The cheapest plan for one side of tiles and number of pulses per group whose predicted error is at most
+    `tolerance`; `best` where none is cheaper."""
     side, group, n_samples, n_pixels = curvature.side, curvature.group, task.raw.n_samples, task.grid.size
     order, fixed = series(tolerance, curvature, task.highest)
     fixed += error_bounds.phase_rounding(0.0, task.highest, True) * 2
     fixed += error_bounds.position_rounding(curvature.radius, task.bandwidth, False)
     fixed += error_bounds.curvature_rounding(curvature.radius, curvature.distance, task.highest)
     if not fixed <= MOST_FIXED * tolerance:
-        return
+        return best
     fixed += curvature.phase_error + error_bounds.sum_rounding(group, n_samples)
     shift, cells = curvature.shift(task.bandwidth), curvature.cells(task.bandwidth)
     for fine, taps, slope in itertools.product(FINES, interpolation.LINE_TERMS, (False, True)):
         if cells * SAMPLING_MARGIN >= fine or _local_bytes(side, group, fine, taps, slope) > LOCAL_BYTES:
+            continue
+        vectors = fine * (SAMPLED_SIDES * side + SAMPLED_ENDS)
+        cost = _cost(side, group, taps, slope, vectors)  # with the cheapest interpolator of range profiles
+        if best is not None and cost >= best.cost:
             continue
         line = interpolation.line_interpolator(taps, fine / cells)
         shift_error = shift**2 / 2 + SLOPE_ERROR * shift * line.error if slope else shift
         error = fixed + line.error + shift_error
         if not error <= MOST_CHOSEN * tolerance:
             continue
-        vectors = fine * (SAMPLED_SIDES * side + SAMPLED_ENDS)
-        cost = _cost(side, group, taps, slope, vectors)
         if source is not None:
             interpolator, length = source
             if not interpolator.error <= tolerance - error:
@@ -155,8 +159,9 @@ def _plans(
                 continue
             interpolator, length, profile_cost = choice
             cost += (profile_cost - cost_model.TAPS[2]) * reads / n_pixels
-        limit_cycles, limit_position, limit_step = curvature.limits(task.bandwidth, length / n_samples)
-        yield LinePlan(
+            if best is not None and cost >= best.cost:
+                continue
+        best = LinePlan(
             side=side,
             fine=fine,
             group=group,
@@ -165,12 +170,11 @@ def _plans(
             length=length,
             order=order,
             slope=slope,
-            limit_cycles=limit_cycles,
-            limit_position=limit_position,
-            limit_step=limit_step,
+            limits=curvature.limits(task.bandwidth, length / n_samples),
             predicted_error=error + interpolator.error,
             cost=cost,
         )
+    return best
 
 
 def _local_bytes(side: int, group: int, fine: int, taps: int, slope: bool) -> int:

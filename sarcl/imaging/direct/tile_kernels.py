@@ -140,7 +140,7 @@ class _Lines:
         assert tiling.grid.spacing is not None
         self.steps = dict(zip(("step_y", "step_x"), tiling.grid.spacing, strict=True))
         self.axes = device.upload(float_pairs.wide(steps(tiling.grid)))
-        self.limits = {name: getattr(plan, name) for name in ("limit_cycles", "limit_position", "limit_step")}
+        self.limits = plan.limits
 
     def ready(self, tiles: Tiles, skip: int) -> TilesOnDevice:
         """Upload tiles; skip: SKIP_WINDOW and SKIP_BEAM of kernels/geometry.clh."""

@@ -47,15 +47,29 @@ class _Descent:
 class _Tiles:
     """Tiles first ... first + count - 1 of a level that pulses are merged into.
 
-    parents  numbers of the tiles above;  blocks  of pulses, between the same kept pulses, and n_blocks, their number
+    parents  numbers of the tiles above, of whose profiles those of `first_parent` come first
+    blocks   of pulses, between the same kept pulses, and n_blocks, their number
     """
 
     level: int
     first: int
     count: int
     parents: Buffer
+    first_parent: int
     blocks: Buffer
     n_blocks: int
+
+
+@dataclass(frozen=True, eq=False)
+class _Merged:
+    """Profiles of tiles at their kept pulses, of which those of tile `first` come first.
+
+    n_zeroed  kept pulses that have numbers before; the others begin at zero
+    """
+
+    buffer: Buffer
+    first: int
+    n_zeroed: int
 
 
 class Factorized(Engine):
@@ -270,12 +284,10 @@ class Factorized(Engine):
                         continue
                     cut_buffer = device.upload(seen.astype(np.int32)) if len(seen) else nowhere
                     in_use.append(cut_buffer)
-                    tiles = _Tiles(0, tile, count, nowhere, cut_buffer, len(seen))
+                    tiles = _Tiles(0, tile, count, nowhere, 0, cut_buffer, len(seen))
                     self._shift(down, tiles, pulses, profiles, records)
-                    n_zeroed = self.kept[0].n_used if start else 0
-                    self._merge(
-                        tiles, pulses, profiles, records, gathered, first_parent=0, first_out=low, n_zeroed=n_zeroed
-                    )
+                    merged = _Merged(gathered, low, self.kept[0].n_used if start else 0)
+                    self._merge(tiles, pulses, profiles, records, merged)
                 pipeline.step(partial(on_progress, stop))
                 clock.lap("backproject")
         clock.lap("backproject")
@@ -291,30 +303,15 @@ class Factorized(Engine):
         buffers = pulses.buffer, centers[above], centers[level], tiles.parents, tables, records
         self.device.run(self.merges[level][0], size, None, launch, *buffers)
 
-    def _merge(
-        self,
-        tiles: _Tiles,
-        pulses: Pulses,
-        profiles: Profiles,
-        records: Buffer,
-        merged: Buffer,
-        *,
-        first_parent: int,
-        first_out: int,
-        n_zeroed: int,
-    ) -> None:
-        """Add the profiles of the level above to the kept pulses of tiles, in a buffer that begins with `first_out`.
-
-        first_parent  the tile of the level above whose profiles come first
-        n_zeroed      kept pulses that have numbers before; the others begin at zero
-        """
+    def _merge(self, tiles: _Tiles, pulses: Pulses, profiles: Profiles, records: Buffer, merged: _Merged) -> None:
+        """Add the profiles of the level above to the kept pulses of tiles."""
         level = tiles.level
-        numbers = {"stride": profiles.stride, "origin": profiles.origin, "first_parent": first_parent}
+        numbers = {"stride": profiles.stride, "origin": profiles.origin, "first_parent": tiles.first_parent}
         numbers |= {"n_used": pulses.n_used, "n_blocks": tiles.n_blocks, "reach": self.plan.levels[level].reach}
-        numbers |= {"first": tiles.first, "out_first": first_out, "n_kept": self.kept[level].n_used}
-        launch = launch_numbers(MERGE, "merge", **numbers, out_stride=self.strides[level], n_zeroed=n_zeroed)
+        numbers |= {"first": tiles.first, "out_first": merged.first, "n_kept": self.kept[level].n_used}
+        launch = launch_numbers(MERGE, "merge", **numbers, out_stride=self.strides[level], n_zeroed=merged.n_zeroed)
         size = (self._spans(level), tiles.count)
-        buffers = profiles.buffer, tiles.parents, records, tiles.blocks, self.filters[level], merged
+        buffers = profiles.buffer, tiles.parents, records, tiles.blocks, self.filters[level], merged.buffer
         self.device.run(self.merges[level][1], size, None, launch, *buffers, steps=pulses.n_used)
 
     def _buffer(self, nbytes: int, level: int, use: int) -> Buffer:
@@ -352,10 +349,10 @@ class Factorized(Engine):
             merged = self._buffer(8 * (end - begin) * self.kept[below].n_used * self.strides[below], below, 0)
             records = self._buffer(4 * (4 + plan.between.taps) * pulses.n_used * (end - begin), below, 1)
             n_blocks = len(plan.levels[below].decimation.blocks)
-            tiles = _Tiles(below, begin, end - begin, parents, self.blocks_of[below], n_blocks)
+            tiles = _Tiles(below, begin, end - begin, parents, first, self.blocks_of[below], n_blocks)
             profiles = Profiles(source, stride, origin)
             self._shift(down, tiles, pulses, profiles, records)
-            self._merge(tiles, pulses, profiles, records, merged, first_parent=first, first_out=begin, n_zeroed=0)
+            self._merge(tiles, pulses, profiles, records, _Merged(merged, begin, 0))
             self._descend(down, below, begin, end, merged, begin, within)
             if (begin, end) != every:
                 device.finish()

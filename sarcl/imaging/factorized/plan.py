@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
-from weakref import WeakKeyDictionary
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from ...opencl import fft
 from ..direct import line_plan
 from ..direct.line_plan import LinePlan
 from ..direct.tile_kernels import CHUNK
-from ..focusing_task import FocusingTask
+from ..focusing_task import FocusingTask, per_task
 from ..tiling.of_grid import tiling_of
 from ..tiling.plane import LineTiling
 from ..tiling.tiling import Tiling
@@ -35,9 +35,6 @@ SHARE_SLACK = 1.3  # ratio of a filter's error to its share, at most: other erro
 SMALLER_RATIO = 0.75  # factor on a decimation ratio whose error is too large
 MOST_MERGED = 4096  # pulses between two kept pulses at most: more would not reduce the cost
 GUARD, LEAF_GUARD = 14, 8  # samples beyond a tile that interpolation and whole vectors may read
-
-# Errors of decimations, by what determines them: the candidates of a task share most, at other tolerances too.
-_filter_errors: WeakKeyDictionary[FocusingTask, dict[tuple[Any, ...], float]] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,12 +98,10 @@ def make_plan(task: FocusingTask, tolerance: float, on: DeviceClass = CPU) -> tu
     ToleranceUnreachable where sub-apertures cannot meet it, with the reason, but without a best tolerance, which takes
     a search.
     """
-    order, runs = runs_of(task.raw)
-    track = replace(task.antennas.picked(order), runs=tuple(runs))
     reason = ""
     # near an antenna, lines are curved too much
     for lines in (True, False) if line_plan.possible(task.grid, on) else (False,):
-        case = _Case(task, track, order, tolerance, lines)
+        case = _Case(task, tolerance, lines)
         tried = sorted(case.candidates(), key=lambda candidate: candidate.cost)[:TRIES]
         for candidate in tried:
             plan = case.build(candidate)
@@ -143,32 +138,42 @@ class _Candidate(NamedTuple):
     ratios: list[int]
 
 
+@per_task
+def _smooth_track(task: FocusingTask) -> tuple[PulseGeometry, np.ndarray, float]:
+    """The rows' geometry with smooth runs, the order of rows in which these are consecutive, and the largest change of
+    the gradient of range from one row to the next."""
+    order, runs = runs_of(task.raw)
+    track, tiling = replace(task.antennas.picked(order), runs=tuple(runs)), tiling_of(task.grid, 16)
+    return track, order, rate(track, tiling.outline(), tiling.axes)
+
+
+@per_task
+def _filter_errors(task: FocusingTask) -> dict[tuple[float, ...], float]:
+    """Errors of decimations, by what determines them: candidates share most, at other tolerances too."""
+    return {}
+
+
 class _Case:
     """A task at a tolerance, with what all candidates of its plan share."""
 
-    def __init__(
-        self, task: FocusingTask, track: PulseGeometry, order: np.ndarray, tolerance: float, lines: bool
-    ) -> None:
+    def __init__(self, task: FocusingTask, tolerance: float, lines: bool) -> None:
         grid = task.grid
-        self.task, self.track, self.order, self.tolerance, self.lines = task, track, order, tolerance, lines
+        self.task, self.tolerance, self.lines = task, tolerance, lines
+        self.track, self.order, change = _smooth_track(task)
         self.highest, self.bandwidth = task.highest, task.bandwidth
         self.distance = task.antennas.distance(grid.bounds)
         tiling = tiling_of(grid, 16)
         self.axes, self.points, self.largest = tiling.axes, tiling.outline(), tiling.longest_side
         self.leaves = {side: tiling.leaf_radius(side) for side in (cost_model.LEAF if lines else tiling.leaf_sides)}
-        self.turning = (
-            rate(track, self.points, self.axes) * 2 * self.highest / SPEED_OF_LIGHT
-        )  # cycles per row and metre
+        self.turning = change * 2 * self.highest / SPEED_OF_LIGHT  # cycles per row and metre
 
     def candidates(self) -> Iterator[_Candidate]:
         """All candidates, with their estimated costs."""
         for leaf in self.leaves:
             for chain in chains(leaf, self.largest):
                 share = MERGING_SHARE * self.tolerance / (2 * len(chain) + 1)
-                for taps, filter_taps in ((t, n) for t in TAPS for n in TAPS):
-                    spacing, fine = _spacing(taps, share), _spacing(filter_taps, share)
-                    if spacing is None or fine is None:
-                        continue
+                spacings = [(taps, spacing) for taps in TAPS if (spacing := _spacing(taps, share)) is not None]
+                for (taps, spacing), (filter_taps, fine) in itertools.product(spacings, spacings):
                     estimate = self._cost(chain, taps, spacing, filter_taps, fine)
                     if estimate:
                         yield _Candidate(chain, taps, spacing, filter_taps, fine, share, *estimate)
@@ -225,7 +230,7 @@ class _Case:
         factors = tuple(side // chain[-1] for side in chain)
         radii = tiling.level_radii(factors)
         decimations: list[Decimation] = []
-        filter_errors = _filter_errors.setdefault(self.task, {})
+        filter_errors = _filter_errors(self.task)
         error, source = first.error + error_bounds.sum_rounding(64, raw.n_samples) * len(chain), self.track
         for radius, ratio in zip(radii, candidate.ratios, strict=True):
             above = tuple(d.ratio for d in decimations)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -32,7 +32,6 @@ class Float64Plan:
     per_tile      pixels of a tile
     order         order of the range series: 2, 3, 4; 0: exact differences; WIDE: exact, in pairs of float64
     cost          per row, in units of cost_model
-    next_cheaper  the most accurate of the plans that cost less, or None
     """
 
     interpolator: Interpolator
@@ -41,11 +40,10 @@ class Float64Plan:
     order: int
     predicted_error: float
     cost: float
-    next_cheaper: Float64Plan | None = None
 
     def describe(self, method: str) -> dict[str, object]:
         """The plan in words and numbers, for a report."""
-        words = {
+        return {
             "method": method,
             "taps": self.interpolator.taps,
             "profile samples": self.length,
@@ -53,12 +51,6 @@ class Float64Plan:
             "ranges": "pairs of float64" if self.order == WIDE else "float64",
             "series": f"order {self.order}" if self.order > 0 else "exact",
         }
-        if self.next_cheaper:
-            other = self.next_cheaper
-            words["next cheaper"] = (
-                f"{other.interpolator.taps} taps of {other.length} samples: error {other.predicted_error:.1e}"
-            )
-        return words
 
     def macros(self, wrap: bool) -> dict[str, int]:
         """Build-time macros of kernels/backproject_float64.cl that the plan sets."""
@@ -81,30 +73,28 @@ def make_plan(task: FocusingTask, tolerance: float) -> tuple[Float64Plan, Tiling
         raise ValueError(long)
     tilings = {side**2: tiling_of(task.grid, side) for side in SIDES}
     energy = profile_energy.estimate(task)
-    plans = sorted(_plans(task, tilings, energy), key=lambda p: p.cost)
-    good = next((p for p in plans if p.predicted_error <= tolerance), None)
-    if good is None:
+    plans = list(_plans(task, tilings, energy))
+    able = [plan for plan in plans if plan.predicted_error <= tolerance]
+    if not able:
         ratio = 20 * np.log10(energy.near_pixels)
         dark = f": these pixels are {ratio:.0f} dB darker than their surroundings in the same rows"
         best = askable(rounded_up(min(p.predicted_error for p in plans)))
         how = f"in complex128{dark if energy.near_pixels > 10 else ''}"
         raise ToleranceUnreachable(tolerance, best, "float64 range profiles", how=how)
-    cheaper = [p for p in plans if p.cost < good.cost]
-    other = min(cheaper, key=lambda p: p.predicted_error, default=None)
-    return replace(good, next_cheaper=other), tilings[good.per_tile]
+    cheapest = min(able, key=lambda plan: plan.cost)
+    return cheapest, tilings[cheapest.per_tile]
 
 
 def _plans(task: FocusingTask, tilings: dict[int, Tiling], energy: ProfileEnergy) -> Iterator[Float64Plan]:
     """All plans. They do not depend on the memory of a device."""
     raw, grid = task.raw, task.grid
-    frequency = float((raw.frequency + raw.n_samples * raw.frequency_step).max())
     distance = task.antennas.distance(grid.bounds)
     extent = float(np.linalg.norm(np.diff(grid.bounds, axis=0)))
     cells = np.clip(2 * float(raw.bandwidth.min()) * extent / SPEED_OF_LIGHT, 1, grid.size)
     expected = error_bounds.darkness(float(cells))
     ranges = [
         (
-            error_bounds.range_error_float64(tiling.radius, distance, frequency, order),
+            error_bounds.range_error_float64(tiling.radius, distance, task.highest, order),
             cost + cost_model.FLOAT64_TILE / per_tile,
             per_tile,
             order,

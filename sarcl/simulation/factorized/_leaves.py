@@ -91,7 +91,7 @@ def vectors_of(first: np.ndarray, lanes: int) -> tuple[np.ndarray, np.ndarray]:
     return vectors, np.repeat(vectors[:-1] * lanes - first[:-1], count) + np.arange(first[-1])
 
 
-def placed(planes: np.ndarray, place: np.ndarray, n: int) -> np.ndarray:
+def placed(planes: np.ndarray | tuple[np.ndarray, ...], place: np.ndarray, n: int) -> np.ndarray:
     """Numbers of scatterers (k, m) at their places among n lanes; the other lanes are 0."""
     out = np.zeros((len(planes), n), np.float32)
     for row, plane in zip(out, planes, strict=True):

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base.boxes import box
-from ...base.morton import DEPTH, morton_codes
+from ...base.morton import DEPTH, morton_codes, order_of_codes
 from ...numerics.pulse_geometry import PulseGeometry
 
 WINDOW_DEPTHS = (0, 3, 6)  # depths of cells that are looked for in the range window, coarse ones first
@@ -62,9 +62,10 @@ class ScattererCells:
         self.bounds = box(positions)
         self.center = self.bounds.mean(axis=0)
         codes, extent = morton_codes(positions)
-        self.order = np.argsort(codes, kind="stable")
+        self.order = order_of_codes(codes)
         self._codes, self._extent = codes[self.order], extent
-        self.positions = positions[self.order] - self.center
+        self.positions = np.take(positions, self.order, axis=0)
+        self.positions -= self.center
 
     def __len__(self) -> int:
         return len(self.order)
@@ -79,6 +80,7 @@ class ScattererCells:
         cell = self._codes >> np.uint64(3 * (DEPTH - depth))
         return np.concatenate([[0], np.flatnonzero(cell[1:] != cell[:-1]) + 1, [len(self)]])
 
+    @functools.cache  # noqa: B019  a table of numbers, which lives as long as the points
     def typical_radius(self, depth: int) -> float:
         """About the radius, m, of cells of a depth: half the diagonal of a square, or of a cube where cells fill a
         volume."""
@@ -90,9 +92,11 @@ class ScattererCells:
         first = self.first(depth)
         low, high = (f.reduceat(self.positions, first[:-1], axis=0) for f in (np.minimum, np.maximum))
         centers = (low + high) / 2
-        local = self.positions - np.repeat(centers, np.diff(first), axis=0)
-        radii = np.sqrt(np.maximum.reduceat(np.einsum("ij,ij->i", local, local), first[:-1]))
-        return CellLevel(first, low, high, radii)
+        counts, squares = np.diff(first), np.zeros(len(self))
+        for axis in range(3):
+            local = self.positions[:, axis] - np.repeat(centers[:, axis], counts)
+            squares += local * local
+        return CellLevel(first, low, high, np.sqrt(np.maximum.reduceat(squares, first[:-1])))
 
     def joined(self, depth: int, smaller: CellLevel) -> CellLevel:
         """The cells of a depth, from those of a deeper one: their radius is a bound."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -169,20 +170,18 @@ class _Case:
         """All candidates, with their estimated costs."""
         for depths in chains(len(self.cells)):
             share = MOVING_SHARE * self.tolerance / (2 * len(depths))
-            for spread, between in self._interpolators(share):
-                length = self._length(spread)
-                for filter_taps in TAPS:
-                    fine = _fineness(filter_taps, share)
-                    ratios = None if fine is None else self._ratios(depths, fine)
-                    if fine is None or ratios is None:
-                        continue
-                    cost = self._cost(depths, spread, between, filter_taps, ratios)
-                    yield Candidate(depths, spread, between, length, filter_taps, fine, share, ratios, cost)
+            filters = [(taps, fine, self._ratios(depths, fine)) for taps, fine in _filters(share)]
+            for spread, between, length in self._interpolators(share):
+                for filter_taps, fine, ratios in filters:
+                    if ratios is not None:
+                        cost = self._cost(depths, spread, between, filter_taps, ratios)
+                        yield Candidate(depths, spread, between, length, filter_taps, fine, share, ratios, cost)
 
-    def _interpolators(self, share: float) -> Iterator[tuple[Interpolator, Interpolator]]:
-        """Kernels that spread points, and that move profiles, within their shares: for each number of taps the widest
-        spacing of samples."""
-        most = (1 - MOVING_SHARE) * SPREADING_SHARE * self.tolerance
+    @functools.cache  # noqa: B019  a few tables, which live as long as the plan is made
+    def _interpolators(self, share: float) -> list[tuple[Interpolator, Interpolator, int]]:
+        """Kernels that spread points, and that move profiles, within their shares, and the length of the profiles: for
+        each number of taps the widest spacing of samples."""
+        most, kernels = (1 - MOVING_SHARE) * SPREADING_SHARE * self.tolerance, []
         for taps in TAPS:
             spacing = next((s for s in SPACINGS if interpolation.line_interpolator(taps, s).error <= share), None)
             if spacing is None:
@@ -190,7 +189,9 @@ class _Case:
             spread = (interpolation.interpolator(n, spacing) for n in interpolation.TERMS)
             narrowest = next((kernel for kernel in spread if kernel.error <= most), None)
             if narrowest is not None:
-                yield narrowest, interpolation.line_interpolator(taps, spacing)
+                between = interpolation.line_interpolator(taps, spacing)
+                kernels.append((narrowest, between, self._length(narrowest)))
+        return kernels
 
     def _length(self, spread: Interpolator) -> int:
         """Samples of a profile."""
@@ -327,10 +328,12 @@ def chains(n_points: int) -> Iterator[tuple[int, ...]]:
                     yield (leaf - step - second, leaf - step, leaf)
 
 
-def _fineness(filter_taps: int, error: float) -> float | None:
-    """Kept pulses per Nyquist interval at which the error of so many taps is at most `error`; None: none."""
+@functools.lru_cache(maxsize=16)
+def _filters(error: float) -> list[tuple[int, float]]:
+    """Taps of filters over the pulses, and the fewest kept pulses per Nyquist interval with an error up to `error`."""
     spacings = (1.5, 1.75, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0)
-    return next((s for s in spacings if interpolation.line_interpolator(filter_taps, s).error <= error), None)
+    fine = [(n, [s for s in spacings if interpolation.line_interpolator(n, s).error <= error]) for n in TAPS]
+    return [(n, able[0]) for n, able in fine if able]
 
 
 def _reaches(levels: list[CellLevel], sigma: float, spread_taps: int, taps: int) -> list[int]:

@@ -39,13 +39,13 @@ class Channel:
 class Scatterers:
     """Scatterers in cells, and the channels in which they are added.
 
-    planes   numbers of the scatterers as kernels/spread_leaves.cl reads them, float32 (k, n), in the order of the cells
+    planes   numbers of the scatterers as kernels/spread_leaves.cl reads them, (n,) each, in the order of the cells
     weights  of the antennas, at every pulse
     macros   FACETS and those of facets, for the kernel;  up  float32 (6,), as spread_facets.cl reads it
     """
 
     cells: ScattererCells
-    planes: np.ndarray
+    planes: np.ndarray | tuple[np.ndarray, ...]
     channels: tuple[Channel, ...]
     weights: AntennaWeights
     macros: Mapping[str, int] = field(default_factory=lambda: {"FACETS": 0, "METAL": 0, "ROUGH": 0, "COHERENT": 0})

@@ -81,8 +81,7 @@ class PointPlan:
             Channel(tuple(columns), None if len(nodes) == 1 else weight, ratio=ratio)
             for weight, ratio in zip(basis, ratios, strict=True)
         )
-        planes = np.stack([amplitudes.real, amplitudes.imag])
-        scatterers = Scatterers(cells, planes, channels, view.weights)
+        scatterers = Scatterers(cells, (amplitudes.real, amplitudes.imag), channels, view.weights)
         return FactorizedSpreader(device, plan, scatterers, view.antennas, len(view.frequencies), budget)
 
 
