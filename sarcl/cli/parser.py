@@ -15,7 +15,7 @@ import sys
 from collections.abc import Callable
 from typing import Any, NoReturn
 
-from ..io import formats
+from ..io import formats, output_paths
 from ._flags import CHOICES, DEFAULTS
 
 EPILOG = """examples:
@@ -326,7 +326,7 @@ def _kept(outputs: dict[str, tuple[int, int] | None]) -> str:
     names = complete(outputs)
     verb = "is" if len(names) == 1 else "are"
     rest = "nothing else was written" if names else "nothing was written"
-    if any(os.path.isdir(os.path.realpath(path) + ".parts") for path in outputs):
+    if any(map(output_paths.tile_folder, outputs)):
         rest = "only finished tiles are kept"
     return f"{' and '.join(names)} {verb} complete, {rest}" if names else rest
 

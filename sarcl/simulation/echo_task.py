@@ -10,7 +10,6 @@ import numpy as np
 from ..base.validation import instance
 from ..model.trajectory import Trajectory
 from ..model.waveform import Waveform
-from ..opencl.choose_device import open_device, open_devices, split_choice
 from ..opencl.device import Device
 from ..scattering import antenna_weights
 from ..scattering.antenna_weights import AntennaWeights
@@ -55,7 +54,7 @@ class EchoTask:
 def echo_task(scene: Scene, waveform: Waveform, track: Trajectory, options: EchoOptions) -> EchoTask:
     """The task of these arguments; opens the device."""
     check_subjects(scene, waveform, track)
-    devices = _devices(options)
+    devices = options.devices()
     request = replace(EchoRequest.of(options, scene, devices[0]), method=options.method)
     scene.kept.limit(KEPT * request.budget)
     point = scene.center if options.reference is None else np.asarray(options.reference)
@@ -77,13 +76,6 @@ def echo_task(scene: Scene, waveform: Waveform, track: Trajectory, options: Echo
         weights=weights,
         devices=devices,
     )
-
-
-def _devices(options: EchoOptions) -> tuple[Device, ...]:
-    """Devices of this process; with a cluster one, which plans and checks."""
-    if options.cluster is None:
-        return tuple(open_devices(options.device))
-    return (open_device(split_choice(options.device)[0]),)
 
 
 def check_subjects(scene: object, waveform: object, track: object) -> None:
