@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
@@ -52,6 +52,10 @@ class BlockOptions(RunOptions):
     cluster: distributed.Client | None = option(
         None, "a dask.distributed.Client whose workers compute the tiles, each on a device of its own", in_files=False
     )
+
+    def portable(self) -> Self:
+        """See RunOptions."""
+        return replace(super().portable(), cluster=None)
 
     def devices(self) -> tuple[Device, ...]:
         """Devices of this process; with a cluster, which is checked, one: it plans and checks."""

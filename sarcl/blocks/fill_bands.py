@@ -43,13 +43,13 @@ class BandFiller:
         job, bands, checkpoint = self.job, self.job.bands, self.checkpoint
         runs = [(0, bands.n_bands)] if runs is None else runs
         there, tallies = [], list[tuple[int, Tally]]()
-        for run, values, tally in (found for run in runs for found in (checkpoint.found(*run) if checkpoint else ())):
-            if run in there:
-                continue
-            if flat is not None:
-                flat[bands.extent(*run)] = values
-            there.append(run)
-            tallies.append((run[0], tally))
+        for asked in runs if checkpoint else ():
+            for run, values, tally in checkpoint.found(*asked) if checkpoint else ():
+                if run not in there:
+                    if flat is not None:
+                        flat[bands.extent(*run)] = values
+                    there.append(run)
+                    tallies.append((run[0], tally))
         todo = [gap for run in runs for gap in gaps(there, *run)]
         units = sum(bands.count(*run) for run in todo)
         total, reported = job.passes * units, -1

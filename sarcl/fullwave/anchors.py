@@ -69,7 +69,7 @@ def anchored(
         try:
             pulses = search.send([formed(pulse) for pulse in pulses])
         except StopIteration as end:
-            return end.value  # type: ignore[no-any-return]
+            return end.value
 
 
 def anchor_search(

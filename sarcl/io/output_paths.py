@@ -17,7 +17,7 @@ from ._part import Part
 
 FILES = (__file__, _part.__file__)  # whose functions begin and finish files, and must not be interrupted by signals
 LEAST_ROOM = 2**16  # bytes that must be free for a file whose size is not known: none is smaller than a disk's blocks
-# endings of the folders, beside an unfinished result, of its finished tiles: of images and echoes, and of full-wave runs
+# endings of folders beside an unfinished result: of finished tiles of images and echoes, and of full-wave runs
 TILES, ANCHORS = ".parts", ".anchors"
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 

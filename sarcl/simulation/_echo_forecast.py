@@ -146,8 +146,7 @@ def _allotted(planned: PlannedEchoes) -> tuple[ErrorTerm, ...]:
 def _spectral(task: EchoTask, work: EchoWork, seconds: float) -> str:
     """About the seconds of spectral_echo with these arguments, or why it refuses them or was not planned."""
     try:
-        on_one = replace(task.options, device=task.devices[0])
-        spectral = spectral_task(task.original, task.waveform, task.given_track, on_one)
+        spectral = spectral_task(task.original, task.waveform, task.given_track, task.options, task.devices[:1])
         longest = SPECTRAL_SHARE * work.seconds
         if work.cutting > longest:
             return "not planned: its facets would have to be cut and illuminated first"

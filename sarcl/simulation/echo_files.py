@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from typing import Any
 
@@ -78,7 +78,7 @@ class EchoFiles:
 
 
 def job_description(
-    options: BlockOptions, subjects: dict[str, object], shape: tuple[int, ...], named: dict[str, object]
+    options: BlockOptions, subjects: dict[str, object], shape: tuple[int, ...], named: Mapping[str, object]
 ) -> dict[str, Any]:
     """Everything that samples of a shape depend on, as text and numbers; arrays as checksums.
 

@@ -47,8 +47,7 @@ class EchoTask:
 
     def __getstate__(self) -> dict[str, Any]:
         """For another process: without what belongs to this one."""
-        options = replace(self.options, device=None, cluster=None, progress=None)
-        return {**self.__dict__, "options": options, "devices": ()}
+        return {**self.__dict__, "options": self.options.portable(), "devices": ()}
 
 
 def echo_task(scene: Scene, waveform: Waveform, track: Trajectory, options: EchoOptions) -> EchoTask:

@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from sarcl.fullwave.echoes._anchor_files import AnchorFiles
 
 import sarcl
 from sarcl import shapes
@@ -21,7 +22,6 @@ from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.base.report import root_sum_square
 from sarcl.fullwave import runs
 from sarcl.fullwave.echoes import _fullwave_task, _grid_choice
-from sarcl.fullwave.echoes._anchor_files import AnchorFiles
 from sarcl.fullwave.runs import RunEnd
 from sarcl.opencl.choose_device import open_device
 from sarcl.reference import mie

@@ -34,14 +34,14 @@ def around(*degrees, height=0.0):
     return sarcl.Trajectory(None, np.stack([40 * np.cos(angle), 40 * np.sin(angle), height + 0 * angle], 1))
 
 
-ARC = around(*np.linspace(20, 75, 12))
+ARC = around(*np.linspace(20, 40, 9))
 MIRRORED = around(-30, 0, 30, height=9.0)
-LOSSY = replace(BOX, materials=(Material(name="wet", eps_r=3 - 0.2j),))
+LOSSY = replace(BOX, materials=(Material(name="wet", eps_r=1.5 - 0.1j),))
 CASES = {
     "auto": (BOX, ARC, {"polarization": ("HH", "VV"), "tolerance": 0.1}),
-    "all": (BOX, ARC, {"polarization": "all", "anchors": [1, 9], "check": True, "model_error": True}),
+    "all": (BOX, ARC, {"polarization": "all", "anchors": [0, 6], "check": True, "model_error": True, "tolerance": 0.2}),
     "mirrored": (BOX, MIRRORED, {"anchors": [0, 1, 2], "polarization": ("VV", "HV")}),
-    "lossy": (LOSSY, ARC, {"anchors": 2, "model_error": True, "cells": 14}),
+    "lossy": (LOSSY, ARC, {"anchors": 2, "model_error": True}),
     "parts": (BOX, ARC, {"anchors": 2, "max_bytes": 7.8e6}),
 }
 
@@ -114,11 +114,10 @@ def stop_after(runs):
 
 @pytest.mark.parametrize("case", CASES)
 def test_pieces_in_any_order_have_the_bits_of_one_call(case, whole, tmp_path):
-    for n, order in ((2, (2, 1)), (7, (3, 7, 1, 2, 6, 5, 4))):
-        pieces = [of(case, out=tmp_path / f"{n}.h5", tile=(i, n)) for i in order]
-        assert pieces[:-1] == [None] * (n - 1) and same(pieces[-1], whole(case))
-        assert "from files" in pieces[-1].report.plan
-    assert names(tmp_path) == ["2.h5", "7.h5"]
+    order = (2, 1) if case != "all" else (3, 7, 1, 2, 6, 5, 4)
+    pieces = [of(case, out=tmp_path / "a.h5", tile=(i, len(order))) for i in order]
+    assert pieces[:-1] == [None] * (len(order) - 1) and same(pieces[-1], whole(case))
+    assert "from files" in pieces[-1].report.plan and names(tmp_path) == ["a.h5"]
 
 
 def test_a_piece_of_finished_echoes_does_nothing(tmp_path):

@@ -65,12 +65,13 @@ class AnchorSearches:
         while self._asked:
             runs.compute(self._runs())
             for sent, pulses in list(self._asked.items()):
+                echoes = [runs.echoes(run) for run in anchors_of(sent, pulses)]
                 try:
-                    self._asked[sent] = self._searches[sent].send([runs.echoes(run) for run in anchors_of(sent, pulses)])
+                    self._asked[sent] = self._searches[sent].send(echoes)
                 except StopIteration as end:
                     found[sent] = end.value
                     del self._asked[sent]
-        runs.compute(run for sent, echoes in found.items() for run in self._others(sent, echoes.pulses))
+        runs.compute(run for sent, one in found.items() for run in self._others(sent, one.pulses))
         return {sent: found[sent] for sent, _ in self.task.sendings}
 
 

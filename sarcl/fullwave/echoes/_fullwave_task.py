@@ -78,8 +78,7 @@ class FullwaveTask:
 
     def __getstate__(self) -> dict[str, Any]:
         """For another process: without what belongs to this one."""
-        options = replace(self.options, device=None, cluster=None, progress=None)
-        return {**self.__dict__, "options": options, "device": None, "devices": ()}
+        return {**self.__dict__, "options": self.options.portable(), "device": None, "devices": ()}
 
     def on(self, device: Device) -> FullwaveTask:
         """The same task on another device, with the bodies as they are cut."""
@@ -214,11 +213,13 @@ class FullwaveTask:
         shape = len(pulses), len(received), len(self.frequencies)
         formed = [np.empty(shape, np.complex64) for _ in range(1 + (twin is not None))]
         path = half_path(tx, rx, runs.centre_of(self.lattice)) - half_path(tx, rx, self.centre)
-        steps, left, parts = 0, 0.0, self.parts
+        steps, left, parts, shown = 0, 0.0, self.parts, 0.0
         for number, part in enumerate(parts):
 
             def share_done(done: int, expected: int, before: int = number) -> None:
-                progress((before + min(done / max(expected, 1), MOST_SHOWN)) / len(parts))
+                nonlocal shown
+                shown = max(shown, (before + min(done / max(expected, 1), MOST_SHOWN)) / len(parts))
+                progress(shown)
 
             part_echoes, ended = runs.run(
                 self.device, self.lattice, self.target, self.band, self.wavenumbers[part],

@@ -24,8 +24,8 @@ from ...simulation.echo_output import EchoOutput
 from ._forecast import forecast_of, is_cut
 from ._formed_samples import AnchorSearches, checked_anchors, formed_samples
 from ._fullwave_task import FullwaveTask, fullwave_task
-from ._model_error import check_thickness, coarse_task
 from ._grid_runs import GridRuns, RunProgress, run_job
+from ._model_error import check_thickness, coarse_task
 from ._options import FullwaveOptions
 from ._run_bands import RunBands, RunEngine, RunRecipe
 
