@@ -15,7 +15,7 @@ import sys
 from collections.abc import Callable
 from typing import Any, NoReturn
 
-from ..io import formats, output_paths
+from ..io import formats
 from ._flags import CHOICES, DEFAULTS
 
 EPILOG = """examples:
@@ -321,6 +321,7 @@ def main(argv: list[str] | None = None) -> int:
 def _kept(outputs: dict[str, tuple[int, int] | None]) -> str:
     if not outputs:
         return "nothing was written"
+    from ..io import output_paths
     from ._job import complete
 
     names = complete(outputs)
