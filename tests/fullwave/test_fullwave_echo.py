@@ -413,7 +413,7 @@ def test_a_forecast_runs_its_own_plan_which_cuts_the_bodies_once(monkeypatch):
         assert np.array_equal(np.asarray(raw.samples), np.asarray(whole.samples))
         for name in ("predicted_error", "error_terms", "model_error", "contributions_done"):
             assert getattr(raw.report, name) == getattr(whole.report, name)
-        assert set(raw.report.seconds) == {"plan", "runs", "model error"}
+        assert set(raw.report.seconds) == {"plan", "files", "full-wave runs", "forming"}
     assert len(cuts) == 3  # and with the conductivity at the upper end of the band
 
 
