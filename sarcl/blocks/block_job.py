@@ -8,6 +8,7 @@ from typing import Any
 
 from numpy.typing import DTypeLike
 
+from ..io import output_paths
 from ..io.formats import Kind
 from .bands import Bands, Tally
 
@@ -23,6 +24,7 @@ class BlockJob:
     dtype     of its values;  tally  class of what is known of a block besides its values
     passes    contributions to one unit of work of the bands: progress counts units times passes
     describe  everything that the values depend on, as text and numbers (see tile_files.mark)
+    folder    ending of the folder of its tile files, after the path of the result
     """
 
     kind: Kind
@@ -33,3 +35,4 @@ class BlockJob:
     tally: type[Tally]
     passes: int
     describe: Callable[[], dict[str, Any]]
+    folder: str = output_paths.TILES

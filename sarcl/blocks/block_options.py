@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
 from ..base.options import option, or_none
 from ..base.validation import count, instance
 from ..numerics.run_options import RunOptions
-from ..opencl.device import DeviceChoice
+from ..opencl.choose_device import open_device, open_devices, split_choice
+from ..opencl.device import Device, DeviceChoice
+from .bands import Engine, Recipe
+from .block_job import BlockJob
+from .workers import LocalWorkers, WorkerPool, rates_of, speedup
 
 if TYPE_CHECKING:
     import distributed
@@ -48,6 +52,36 @@ class BlockOptions(RunOptions):
     cluster: distributed.Client | None = option(
         None, "a dask.distributed.Client whose workers compute the tiles, each on a device of its own", in_files=False
     )
+
+    def portable(self) -> Self:
+        """See RunOptions."""
+        return replace(super().portable(), cluster=None)
+
+    def devices(self) -> tuple[Device, ...]:
+        """Devices of this process; with a cluster, which is checked, one: it plans and checks."""
+        if self.cluster is None:
+            return tuple(open_devices(self.device))
+        from .dask_workers import checked
+
+        checked(self.cluster)
+        return (open_device(split_choice(self.device)[0]),)
+
+    def workers(self, job: BlockJob, recipe: Recipe, devices: Sequence[Device], first: Engine) -> WorkerPool:
+        """The workers of the cluster, or engines on the devices;  first  that of the first device."""
+        if self.cluster is not None:
+            from .dask_workers import DaskWorkers
+
+            return DaskWorkers(self.cluster, job, recipe, self.device, first.most)
+        engines = [first, *(recipe.on(device) for device in devices[1:])]
+        infos = [device.info for device in devices]
+        budgets = [recipe.budget(device) for device in devices]
+        return LocalWorkers(job, engines, budgets, [info.name for info in infos], rates_of(infos))
+
+    def speedup(self, devices: Sequence[Device]) -> float:
+        """How many times as fast as the first device all are that share the work; workers of a cluster count as one."""
+        if self.cluster is not None:
+            return float(max(1, len(self.cluster.nthreads())))
+        return speedup([device.info for device in devices])
 
     def piece(self, has_path: bool, example: str) -> tuple[int, int] | None:
         """`tile` as (i, n), 0 <= i <= n, or None; ValueError for options that do not go together.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
@@ -47,7 +47,7 @@ class Checkpoint:
 
     def __init__(self, path: PathLike, job: BlockJob, resume: bool | None) -> None:
         self.path, self.job = path, job
-        self.folder, self.resume = folder_of(path), resume
+        self.folder, self.resume = folder_of(path, job), resume
         self.tiles: TileStore | None = None
         self.begun = time.monotonic()
         self.fresh, self._are_lost = True, False
@@ -74,9 +74,10 @@ class Checkpoint:
         self.done()
         return store.read(self.path)
 
-    def complete(self) -> bool:
-        """Whether every band has a tile file."""
-        return self.tiles is not None and not gaps(self.tiles.runs(), 0, self.job.bands.n_bands)
+    def complete(self, runs: Iterable[Run]) -> bool:
+        """Whether every band of `runs` has a tile file."""
+        there = self.tiles.runs() if self.tiles else []
+        return not any(gaps(there, *run) for run in runs)
 
     def found(self, first: int, last: int) -> Iterator[tuple[Run, np.ndarray, Tally]]:
         """Tiles of earlier runs; see TileStore.found."""

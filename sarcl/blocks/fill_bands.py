@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from ..opencl.failures import DeviceFailed
 from .bands import BandBuffer, FlatArray, Run, Tally
 from .block_job import BlockJob
 from .checkpoint import Checkpoint
-from .tile_files import gaps, share
+from .tile_files import gaps, part, share
 from .workers import Work, WorkerPool
 
 MOST_FILES = 64  # blocks per result, where finished bands are written to files: each block makes one file
@@ -30,24 +30,28 @@ class BandFiller:
     clock: Clock
     progress: Callable[[str, int, int], None] | None
 
-    def fill_piece(self, piece: tuple[int, int]) -> bool:
-        """Compute the bands of piece (i, n) into tile files; whether every band of the result has one then."""
-        self.fill(None, share(self.job.bands.n_bands, *piece, self.job.unit))
-        return self.checkpoint is not None and self.checkpoint.complete()
+    def fill_piece(self, piece: tuple[int, int], runs: Sequence[Run] | None = None) -> bool:
+        """Compute the bands of piece (i, n) of `runs`, by default of all bands, into tile files; whether every band of
+        `runs` has one then."""
+        runs = [(0, self.job.bands.n_bands)] if runs is None else runs
+        self.fill(None, part(runs, *share(sum(b - a for a, b in runs), *piece, self.job.unit)))
+        return self.checkpoint is not None and self.checkpoint.complete(runs)
 
-    def fill(self, flat: FlatArray | None, run: Run | None = None) -> tuple[Tally, int]:
-        """Compute a run of bands, by default all, into the flat array, or only into tile files; returns the sum of the
+    def fill(self, flat: FlatArray | None, runs: Sequence[Run] | None = None) -> tuple[Tally, int]:
+        """Compute runs of bands, by default all, into the flat array, or only into tile files; returns the sum of the
         tallies in the order of the bands, and the number of bands that files already held."""
         job, bands, checkpoint = self.job, self.job.bands, self.checkpoint
-        run = (0, bands.n_bands) if run is None else run
+        runs = [(0, bands.n_bands)] if runs is None else runs
         there, tallies = [], list[tuple[int, Tally]]()
-        for part, values, tally in checkpoint.found(*run) if checkpoint else ():
-            if flat is not None:
-                flat[bands.extent(*part)] = values
-            there.append(part)
-            tallies.append((part[0], tally))
-        todo = gaps(there, *run)
-        units = sum(bands.count(*part) for part in todo)
+        for asked in runs if checkpoint else ():
+            for run, values, tally in checkpoint.found(*asked) if checkpoint else ():
+                if run not in there:
+                    if flat is not None:
+                        flat[bands.extent(*run)] = values
+                    there.append(run)
+                    tallies.append((run[0], tally))
+        todo = [gap for run in runs for gap in gaps(there, *run)]
+        units = sum(bands.count(*run) for run in todo)
         total, reported = job.passes * units, -1
 
         def on_progress(done: int) -> None:
@@ -79,8 +83,8 @@ class BandFiller:
             if checkpoint and flat is not None:  # without an output every block is written at once
                 checkpoint.rescue(flat)
             raise
-        if gaps(there + finished, *run):
-            raise RuntimeError(f"bands {gaps(there + finished, *run)} were left out; please report this")
+        if missing := [gap for run in runs for gap in gaps(there + finished, *run)]:
+            raise RuntimeError(f"bands {missing} were left out; please report this")
         tally = job.tally()
         for _, one in sorted(tallies, key=lambda pair: pair[0]):
             tally = tally + one

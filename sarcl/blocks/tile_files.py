@@ -14,7 +14,7 @@ import os
 import re
 import secrets
 import struct
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict
 from itertools import chain
 from pathlib import Path
@@ -35,12 +35,12 @@ NAME = re.compile(r"bands-(\d+)-(\d+)\.tiles")
 DIGEST = 32  # bytes
 FOREIGN = "belongs to another job"  # reason why a file is left alone
 # entries of a description that a message shows; of others it says that they differ
-PLAIN = ("sarcl", "method", "tolerance", "pixels", "wrap", "skip", "polarization", "seed")
+PLAIN = ("sarcl", "method", "tolerance", "pixels", "wrap", "skip", "polarization", "seed", "variant", "cells")
 
 
-def folder_of(path: PathLike) -> Path:
-    """The folder for the tile files of the result `path`."""
-    return Path(f"{output_paths.place(path)}.parts")
+def folder_of(path: PathLike, job: BlockJob) -> Path:
+    """The folder for the tile files of a job, whose result is `path`."""
+    return Path(f"{output_paths.place(path)}{job.folder}")
 
 
 class TileStore:
@@ -182,7 +182,7 @@ def discard(folder: Path) -> None:
 
 
 def share(n_bands: int, i: int, n: int, unit: int = 1) -> Run:
-    """Bands of piece i of n; i runs from 1 to n, or from 0 to n - 1: 0 and n are the same piece.
+    """Piece i of n of so many bands; i runs from 1 to n, or from 0 to n - 1: 0 and n are the same piece.
 
     Shares begin at multiples of `unit` bands, unless there are more pieces than units.
     """
@@ -190,6 +190,17 @@ def share(n_bands: int, i: int, n: int, unit: int = 1) -> Run:
     if units < n:
         unit, units = 1, n_bands
     return i * units // n * unit, min((i + 1) * units // n * unit, n_bands)
+
+
+def part(runs: Sequence[Run], first: int, last: int) -> list[Run]:
+    """Bands of `runs`, counted one run after the other, from number `first` to number last - 1."""
+    out, before = [], 0
+    for a, b in runs:
+        begin, end = max(a, a + first - before), min(b, a + last - before)
+        if begin < end:
+            out.append((begin, end))
+        before += b - a
+    return out
 
 
 def gaps(runs: list[Run], first: int, last: int) -> list[Run]:

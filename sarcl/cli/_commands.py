@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..io import formats, input_paths
+from ..io import formats, input_paths, output_paths
 from ._job import Job, Outputs
 from ._pages import bench, fda, papers
 
@@ -100,7 +100,7 @@ def simulate(args: argparse.Namespace, job: Job) -> int:
         raw = scenario.simulate(**options, **on, **running, out=output, progress=job.progress)
         job.check()
         if raw is None:
-            job.say(f"this piece is finished; its tiles wait in {output}.parts for those of the other pieces")
+            _say_piece(output, job)
             return 0
     else:
         raw = scenario.simulate(**options, **on, progress=job.progress)
@@ -201,7 +201,6 @@ def measure(args: argparse.Namespace, job: Job) -> int:
 def _check_room(grid: ImageGrid | None, outputs: list[str]) -> None:
     """Refuse, before the work, outputs for which the disk has no room, where the size of the image is known."""
     from ..figures.decibels import picture_bytes
-    from ..io import output_paths
 
     if grid is not None and len(grid.shape) == 2:
         pictures, shape = formats.writing("picture"), (grid.shape[0], grid.shape[1])
@@ -259,7 +258,7 @@ def _focus(make: Callable[[str | None], Image | None], outputs: list[str], args:
     file = next((p for p in outputs if formats.named(p, by_blocks)), None)
     image = make(file)
     if image is None:
-        job.say(f"this piece is finished; its tiles wait in {file}.parts for those of the other pieces")
+        _say_piece(file, job)
         return
     _say_report("focus", image.report, job)
     for path in outputs:
@@ -271,6 +270,12 @@ def _focus(make: Callable[[str | None], Image | None], outputs: list[str], args:
         elif path != file:
             image.save(path)
         job.say(f"wrote {path}{scale}")
+
+
+def _say_piece(path: str | None, job: Job) -> None:
+    folder = path and output_paths.tile_folder(path)
+    where = f"{path}{folder.suffix}" if folder else f"files beside {path}"
+    job.say(f"this piece is finished; its tiles wait in {where} for those of the other pieces")
 
 
 def _say_report(what: str, report: Report | None, job: Job) -> None:

@@ -321,12 +321,13 @@ def main(argv: list[str] | None = None) -> int:
 def _kept(outputs: dict[str, tuple[int, int] | None]) -> str:
     if not outputs:
         return "nothing was written"
+    from ..io import output_paths
     from ._job import complete
 
     names = complete(outputs)
     verb = "is" if len(names) == 1 else "are"
     rest = "nothing else was written" if names else "nothing was written"
-    if any(os.path.isdir(os.path.realpath(path) + ".parts") for path in outputs):
+    if any(map(output_paths.tile_folder, outputs)):
         rest = "only finished tiles are kept"
     return f"{' and '.join(names)} {verb} complete, {rest}" if names else rest
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator, Iterable
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -63,35 +63,61 @@ def anchored(
     tolerance  relative error of the echoes, as Anchored.predicted_error
     mirror     for each pulse the number of the pulse whose anchor the same run serves by symmetry, or -1 (P,)
     """
-    work = _Work(formed, np.asarray(along, float), mirror)
+    search = anchor_search(along, anchors=anchors, tolerance=tolerance, mirror=mirror)
+    pulses = next(search)
+    while True:
+        try:
+            pulses = search.send([formed(pulse) for pulse in pulses])
+        except StopIteration as end:
+            return end.value
+
+
+def anchor_search(
+    along: np.ndarray,
+    *,
+    anchors: str | int | np.ndarray = "auto",
+    tolerance: float = 3e-2,
+    mirror: np.ndarray | None = None,
+) -> Search:
+    """As `anchored`, for callers that run several anchors at a time: yields the pulses of anchors that are to be run,
+    is sent the echoes (P, Q, F) of each, and returns the result. Only with anchors="auto" it yields more than once.
+    """
+    work = _Work(np.asarray(along, float), mirror)
     if not isinstance(anchors, str):
-        work.run(np.atleast_1d(anchors) if np.ndim(anchors) else _equispaced(work.along, int(anchors)))
+        yield from work.run(np.atleast_1d(anchors) if np.ndim(anchors) else _equispaced(work.along, int(anchors)))
         return work.result()
-    work.run(_nearest(work.along, np.array(FIRST)))
+    yield from work.run(_nearest(work.along, np.array(FIRST)))
     while work.model is not None and work.worst is not None:
         n = len(work.got)
         if n >= LEAST and work.predicted_error <= tolerance * (ENOUGH if n > LEAST else ENOUGH_OF_FEW):
             break
-        work.check_and_run(work.worst)
+        yield from work.check_and_run(work.worst)
     return work.result()
+
+
+Runs = Generator[list[int], list[np.ndarray], None]  # pulses of anchors to be run, and the echoes of each
+Search = Generator[list[int], list[np.ndarray], Anchored]
 
 
 class _Work:
     """Anchors that have been run, and the echoes from them."""
 
-    def __init__(self, formed: Callable[[int], np.ndarray], along: np.ndarray, mirror: np.ndarray | None) -> None:
-        self._formed, self._mirror = formed, mirror
+    def __init__(self, along: np.ndarray, mirror: np.ndarray | None) -> None:
+        self._mirror = mirror
         self.along = along if along[-1] >= along[0] else -along
         self.got: dict[int, np.ndarray] = {}
         self.history: list[tuple[int, float]] = []
         self.checks: list[Check] = []
 
-    def run(self, pulses: np.ndarray) -> None:
+    def run(self, pulses: np.ndarray) -> Runs:
         """Run anchors, and what a mirror gives with them, and interpolate; one anchor serves each direction."""
+        numbers = list(self.got)
         for pulse in pulses:
-            for number in (int(pulse), *self._twin(int(pulse))):
-                if not self._served[number]:
-                    self.got[number] = self._formed(number)
+            for number in (int(pulse), *self._twin(int(pulse), numbers)):
+                if not self._served(numbers)[number]:
+                    numbers.append(number)
+        new = numbers[len(self.got) :]
+        self.got |= dict(zip(new, (yield new) if new else [], strict=True))
         self.pulses = np.array(sorted(self.got))
         several = len(self.pulses) > 1
         every = np.stack([self.got[int(pulse)] for pulse in self.pulses])
@@ -103,26 +129,25 @@ class _Work:
         self.predicted_error = float(np.sqrt(error / power)) if power else 0.0  # a body of permittivity 1 has no echo
         self.history.append((len(self.got), self.predicted_error))
 
-    def _twin(self, pulse: int) -> list[int]:
-        """The pulse whose anchor the run of a pulse serves too; none where it is close to another anchor."""
+    def _twin(self, pulse: int, anchors: list[int]) -> list[int]:
+        """The pulse whose anchor the run of a pulse serves too; none where it is close to another of the anchors."""
         twin = -1 if self._mirror is None else int(self._mirror[pulse])
         if twin < 0:
             return []
-        others = self.along[[pulse, *self.got]]
-        apart = APART * float(np.ptp(self.along)) / max(LEAST, len(self.got) + 1)
+        others = self.along[[pulse, *anchors]]
+        apart = APART * float(np.ptp(self.along)) / max(LEAST, len(anchors) + 1)
         return [twin] if np.abs(others - self.along[twin]).min() > apart else []
 
-    @property
-    def _served(self) -> np.ndarray:
+    def _served(self, anchors: Iterable[int]) -> np.ndarray:
         """Which pulses have the direction of an anchor, bool (P,)."""
-        places = self.along[list(self.got)]
+        places = self.along[list(anchors)]
         return (np.abs(self.along[:, None] - places) <= SAME * np.ptp(self.along)).any(axis=1)
 
     @property
     def worst(self) -> int | None:
         """The pulse of the largest error, in the interval between anchors that has most of it; None: no interval."""
         assert self.model is not None
-        error = np.where(self._served, 0.0, self.model.error)
+        error = np.where(self._served(self.got), 0.0, self.model.error)
         ends = [(-1, int(self.pulses[0])), *pairwise(self.pulses.tolist()), (int(self.pulses[-1]), len(self.along))]
         energy = [float(error[a + 1 : b].sum()) if b - a > 1 else -1.0 for a, b in ends]
         first, last = ends[int(np.argmax(energy))]
@@ -130,14 +155,14 @@ class _Work:
             return None
         return first + 1 + int(np.argmax(error[first + 1 : last]))
 
-    def check_and_run(self, pulse: int) -> None:
+    def check_and_run(self, pulse: int) -> Runs:
         """Run an anchor, and compare its echoes near its pulse with their prediction from the others."""
         assert self.model is not None
         weights, expected = self.model.weights[:, pulse], float(self.model.error[pulse])
         reach = NEAR * np.abs(self.along[self.pulses] - self.along[pulse]).min()
         near = np.abs(self.along - self.along[pulse]) <= reach
         guess = sum(w * self.got[int(a)][near] for a, w in zip(self.pulses, weights, strict=True))
-        self.run(np.array([pulse]))
+        yield from self.run(np.array([pulse]))
         own = self.got[pulse][near]
         energy = (np.abs(own) ** 2).sum()
         error = np.sqrt((np.abs(guess - own) ** 2).sum() / energy)

@@ -17,6 +17,8 @@ from ._part import Part
 
 FILES = (__file__, _part.__file__)  # whose functions begin and finish files, and must not be interrupted by signals
 LEAST_ROOM = 2**16  # bytes that must be free for a file whose size is not known: none is smaller than a disk's blocks
+# endings of folders beside an unfinished result: of finished tiles of images and echoes, and of full-wave runs
+TILES, ANCHORS = ".parts", ".anchors"
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
@@ -69,6 +71,12 @@ def place(path: PathLike) -> Path:
             f"cannot write {str(path)!r}: the current folder has been deleted; change to another (os.chdir), or give a "
             "path that begins with /"
         ) from None
+
+
+def tile_folder(path: PathLike) -> Path | None:
+    """The folder of finished tiles beside a result; None where there is none."""
+    folders = (Path(f"{os.path.realpath(path)}{ending}") for ending in (TILES, ANCHORS))
+    return next((folder for folder in folders if folder.is_dir()), None)
 
 
 def no_room(path: PathLike, cause: OSError | None, n_bytes: float = 0, what: str = "it", more: str = "") -> OSError:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Self
 
 from ..base import arguments, validation
 from ..base.options import Options, option, or_none
@@ -35,3 +36,7 @@ class RunOptions(Options):
     progress: Progress | None = option(
         None, "called as progress(stage, done, total)", lambda name, value: arguments.progress(value), in_files=False
     )
+
+    def portable(self) -> Self:
+        """The same for another process: without what belongs to this one."""
+        return replace(self, device=None, progress=None)

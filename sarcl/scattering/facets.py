@@ -125,7 +125,7 @@ class FacetSet:
         """The facets of which all pulses see the same share, and the others; None: there are none."""
         changing = self.is_changing
         if not changing.any():
-            return self, None
+            return replace(self, lit_parts=None, lit_rows=None), None
         return None if changing.all() else self._some(~changing), self._some(changing)
 
     @property

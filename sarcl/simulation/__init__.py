@@ -4,6 +4,7 @@ For other folders:
 
     echo               echo(): echoes of points and facets, to a stated tolerance
     echo_check         random samples recomputed exactly
+    echo_files         output and tile files of echoes that are computed in blocks
     echo_options       options of echo
     echo_output        destination of samples: memory or a file
     echo_request       what is asked of all channels alike: options, for one device

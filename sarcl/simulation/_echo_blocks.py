@@ -8,21 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from ..base.fingerprint import checksum, kernels, leaves
-from ..base.options import described
 from ..base.stage_timer import Clock
 from ..blocks.bands import BandBuffer, FlatArray, Run
 from ..blocks.block_job import BlockJob
 from ..opencl.device import Device
 from ..opencl.memory_budget import budget
 from ._planned_echoes import PlannedEchoes
+from .echo_files import job_description
 from .echo_output import pulses_at_once
 from .echo_task import EchoTask
 from .scene_echoes import Added, SceneEchoes
 
-# options that change nothing, or nothing but rounding; entries of the description with a name of their own
-OF_A_RUN = {"device", "cluster", "progress", "out", "resume", "tile", "max_bytes", "check"}
-NAMED = ("method", "tolerance", "polarization", "seed", "skip")
 # of a block: fewer bytes of samples take longer to write, unless its contributions take about a second
 LEAST_BYTES, LEAST_CONTRIBUTIONS = 2.0**22, 1e8
 UNIT = 64  # pulses: a block begins at a multiple of so many, which fill the lanes of every device
@@ -139,25 +135,14 @@ def echo_job(task: EchoTask, shape: tuple[int, ...], passes: int = 0) -> BlockJo
 
 
 def description(task: EchoTask, shape: tuple[int, ...]) -> dict[str, Any]:
-    """Everything that the samples depend on, as text and numbers; arrays as checksums.
-
-    The device and its memory are left out: they change nothing but rounding. TypeError for an option that cannot be
-    described.
-    """
-    from ..base.version import __version__
-
-    options = task.options
-    values = {name: getattr(options, name) for name in described(type(options)) if name not in OF_A_RUN}
-    others = [value for name in sorted(values) if name not in NAMED for value in (name, *leaves(values[name]))]
-    named = {name: values[name] for name in NAMED}
-    named["skip"] = ", ".join(sorted(task.request.skips))
-    named["polarization"] = ", ".join(task.request.polarizations)
-    return {
-        "sarcl": f"{__version__}, kernels {kernels()}",
-        **named,
-        "samples": " x ".join(map(str, shape)),
-        "scene": checksum(*leaves(task.original)),
-        "waveform": checksum(*leaves(task.waveform)),
-        "track": checksum(*leaves(task.given_track)),
-        "options": checksum(*others),
+    """Everything that the samples depend on: see echo_files.job_description."""
+    options, request = task.options, task.request
+    named = {
+        "method": options.method,
+        "tolerance": options.tolerance,
+        "polarization": ", ".join(request.polarizations),
+        "seed": options.seed,
+        "skip": ", ".join(sorted(request.skips)),
     }
+    subjects = {"scene": task.original, "waveform": task.waveform, "track": task.given_track}
+    return job_description(options, subjects, shape, named)

@@ -21,7 +21,6 @@ from ..base.forecast import Forecast
 from ..base.report import SMALLER_TOLERANCE, ErrorTerm, root_sum_square
 from ..base.stage_timer import Clock
 from ..base.text import duration
-from ..blocks.workers import speedup
 from ..model.phase_history import PhaseHistory
 from ..numerics import cost_model
 from ._planned_echoes import EchoWork, Method, PlannedEchoes
@@ -74,7 +73,7 @@ def forecast_of(
         clock.lap("plan")
         estimate = Estimate(_allotted(planned), known, work.seconds, work.contributions)
     spent = sum(clock.seconds.values())
-    seconds = spent + estimate.seconds / _workers(task)
+    seconds = spent + estimate.seconds / task.options.speedup(task.devices)
     words = planned.channels.words(planned.method, estimate.words)  # type: ignore[arg-type]
     words |= {"contributions": estimate.contributions, "spectral_echo": _spectral(task, work, seconds)}
     return Forecast(
@@ -89,13 +88,6 @@ def forecast_of(
         planning=spent,
         run=run_of(planned),
     )
-
-
-def _workers(task: EchoTask) -> float:
-    """How many times as fast as the first device all are that share the pulses; workers of a cluster count as one."""
-    if task.options.cluster is not None:
-        return float(max(1, len(task.options.cluster.nthreads())))
-    return speedup([device.info for device in task.devices])
 
 
 def _timed(task: EchoTask, planned: PlannedEchoes, prepared: SceneEchoes, work: EchoWork) -> Estimate:
@@ -154,8 +146,7 @@ def _allotted(planned: PlannedEchoes) -> tuple[ErrorTerm, ...]:
 def _spectral(task: EchoTask, work: EchoWork, seconds: float) -> str:
     """About the seconds of spectral_echo with these arguments, or why it refuses them or was not planned."""
     try:
-        on_one = replace(task.options, device=task.devices[0])
-        spectral = spectral_task(task.original, task.waveform, task.given_track, on_one)
+        spectral = spectral_task(task.original, task.waveform, task.given_track, task.options, task.devices[:1])
         longest = SPECTRAL_SHARE * work.seconds
         if work.cutting > longest:
             return "not planned: its facets would have to be cut and illuminated first"

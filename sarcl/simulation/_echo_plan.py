@@ -14,7 +14,6 @@ from ..base.report import Report
 from ..base.stage_timer import Clock
 from ..blocks.checkpoint import Checkpoint
 from ..blocks.fill_bands import BandFiller
-from ..blocks.workers import LocalWorkers, WorkerPool, rates_of
 from ..model.phase_history import PhaseHistory
 from ._echo_blocks import EchoEngine, EchoRecipe, echo_job
 from ._echo_forecast import forecast_of
@@ -22,6 +21,7 @@ from ._planned_echoes import Channels, PlannedEchoes
 from ._single_channel import SingleChannel
 from .channels.array_channels import ArrayChannels
 from .echo_check import worth_checking
+from .echo_files import EchoFiles
 from .echo_output import EchoOutput
 from .echo_request import EchoRequest
 from .echo_task import EchoTask
@@ -48,10 +48,6 @@ class EchoPlan:
         """The plan of a task."""
         array = task.options.array
         channels = SingleChannel(task) if array is None or is_single(array) else ArrayChannels(task, array)
-        if task.options.cluster is not None:
-            from ..blocks.dask_workers import checked
-
-            checked(task.options.cluster)
         piece = task.options.piece(task.options.out is not None, "raw.h5")
         clock.lap("plan")
         return cls(task, channels, clock.seconds, piece)
@@ -86,38 +82,25 @@ class EchoPlan:
         return raw  # type: ignore[return-value]
 
     def _echoes(self, stack: ExitStack, clock: Clock) -> PhaseHistory | None:
-        options, request, checkpoint = self.task.options, self.request(clock), None
-        output = None if self.piece else stack.enter_context(self._output())  # room is found before the work
-        if options.out is not None:
-            resume = True if self.piece else options.resume
-            checkpoint = Checkpoint(options.out, echo_job(self.task, self.channels.shape), resume)
-            stack.push(checkpoint)
-        finished = checkpoint.finished() if self.piece and checkpoint else None
-        if isinstance(finished, PhaseHistory):
+        options, request = self.task.options, self.request(clock)
+        job = echo_job(self.task, self.channels.shape)
+        files = EchoFiles(stack, job, self._output, out=options.out, resume=options.resume, piece=self.piece)
+        if (finished := files.finished()) is not None:
             return finished
         request.report("scene", 0, 3)
         with warned_once():  # the scene may be prepared for one method and then for the other
             planned, prepared = self.plan_scene(request).with_scene()
-            filler = self._filler(planned, prepared, checkpoint, clock)
+            filler = self._filler(planned, prepared, files.checkpoint, clock)
         clock.lap("plan")
-        if self.piece and not filler.fill_piece(self.piece):
-            return None
+        output = files.output(filler)
         if output is None:
-            try:
-                output = stack.enter_context(self._output())
-            except FileExistsError:  # another run is assembling the echoes from all tiles
-                return None
-        if checkpoint:
-            checkpoint.begin()
+            return None
         added, n_kept = filler.fill(output.flat)
         assert isinstance(added, Added)
         prepared.check_seen(added.counts, *self.channels.window)
         clock.lap("spectra")
         fields = self._fields(planned, prepared, filler, output, added=added, n_kept=n_kept)
-        raw = output.finish(checkpoint.mark if checkpoint else None, **fields)
-        if checkpoint:
-            checkpoint.done()
-        return raw
+        return files.finish(**fields)
 
     def _output(self) -> EchoOutput:
         """Destination of the samples."""
@@ -131,17 +114,8 @@ class EchoPlan:
         task, options = self.task, self.task.options
         engine, recipe = EchoEngine(planned, prepared), EchoRecipe(planned.unprepared(), options.max_bytes)
         job = echo_job(task, self.channels.shape, engine.passes)
-        workers: WorkerPool
-        if options.cluster is not None:
-            from ..blocks.dask_workers import DaskWorkers
-
-            workers = DaskWorkers(options.cluster, job, recipe, options.device, engine.most)
-        else:
-            engines = [engine, *(recipe.on(device) for device in task.devices[1:])]
-            budgets = [recipe.budget(device) for device in task.devices]
-            infos = [device.info for device in task.devices]
-            clock.lap("scene")
-            workers = LocalWorkers(job, engines, budgets, [info.name for info in infos], rates_of(infos))
+        workers = options.workers(job, recipe, task.devices, engine)
+        clock.lap("scene")
         return BandFiller(workers, job, checkpoint, clock, options.progress)
 
     def _fields(

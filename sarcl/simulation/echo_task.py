@@ -10,7 +10,6 @@ import numpy as np
 from ..base.validation import instance
 from ..model.trajectory import Trajectory
 from ..model.waveform import Waveform
-from ..opencl.choose_device import open_device, open_devices, split_choice
 from ..opencl.device import Device
 from ..scattering import antenna_weights
 from ..scattering.antenna_weights import AntennaWeights
@@ -48,14 +47,13 @@ class EchoTask:
 
     def __getstate__(self) -> dict[str, Any]:
         """For another process: without what belongs to this one."""
-        options = replace(self.options, device=None, cluster=None, progress=None)
-        return {**self.__dict__, "options": options, "devices": ()}
+        return {**self.__dict__, "options": self.options.portable(), "devices": ()}
 
 
 def echo_task(scene: Scene, waveform: Waveform, track: Trajectory, options: EchoOptions) -> EchoTask:
     """The task of these arguments; opens the device."""
     check_subjects(scene, waveform, track)
-    devices = _devices(options)
+    devices = options.devices()
     request = replace(EchoRequest.of(options, scene, devices[0]), method=options.method)
     scene.kept.limit(KEPT * request.budget)
     point = scene.center if options.reference is None else np.asarray(options.reference)
@@ -77,13 +75,6 @@ def echo_task(scene: Scene, waveform: Waveform, track: Trajectory, options: Echo
         weights=weights,
         devices=devices,
     )
-
-
-def _devices(options: EchoOptions) -> tuple[Device, ...]:
-    """Devices of this process; with a cluster one, which plans and checks."""
-    if options.cluster is None:
-        return tuple(open_devices(options.device))
-    return (open_device(split_choice(options.device)[0]),)
 
 
 def check_subjects(scene: object, waveform: object, track: object) -> None:

@@ -84,7 +84,10 @@ class SpectralEchoKeywords(TypedDict, total=False):
     reference: ArrayLike | None
     compressed: bool
     out: PathLike | None
+    resume: bool | None
+    tile: Tile | None
     device: DeviceChoice | None
+    cluster: distributed.Client | None
     progress: Progress | None
 
 class FullwaveEchoKeywords(TypedDict, total=False):
@@ -96,6 +99,8 @@ class FullwaveEchoKeywords(TypedDict, total=False):
     anchors: Literal["auto"] | int | Sequence[int]
     max_bytes: float | None
     out: PathLike | None
+    resume: bool | None
+    tile: Tile | None
     tolerance: float
     check: bool
     model_error: bool
@@ -104,6 +109,7 @@ class FullwaveEchoKeywords(TypedDict, total=False):
     reference: ArrayLike | None
     compressed: bool
     device: DeviceChoice | None
+    cluster: distributed.Client | None
     progress: Progress | None
 
 class BackprojectKeywords(TypedDict, total=False):
@@ -266,6 +272,7 @@ def echo(
     """Echoes s_p(f) = sum_k a_k(p) W(f) exp(-j 2 pi f (tau_k(p) - tau_ref(p))) of every pulse, compressed. Options:
     docs/guide/options.md."""
 
+@overload
 def spectral_echo(
     scene: Scene,
     waveform: Waveform,
@@ -290,12 +297,50 @@ def spectral_echo(
     reference: ArrayLike | None = None,
     compressed: bool = True,
     out: PathLike | None = None,
+    resume: bool | None = None,
+    tile: None = None,
     device: DeviceChoice | None = None,
+    cluster: distributed.Client | None = None,
     progress: Progress | None = None,
 ) -> PhaseHistory:
     """The samples of `echo` for a straight track of evenly spaced pulses, by two-dimensional Fourier transforms.
     Options: docs/guide/options.md."""
 
+@overload
+def spectral_echo(
+    scene: Scene,
+    waveform: Waveform,
+    track: Trajectory,
+    *,
+    variant: Literal["exact", "saras"] = "exact",
+    ripple: bool = False,
+    receiver: Trajectory | None = None,
+    array: AntennaArray | None = None,
+    range_window: ArrayLike | None = None,
+    skip: bool | Collection[Literal["zero reflectivity", "facing away", "range window"]] = True,
+    max_bytes: float | None = None,
+    tolerance: float = 0.01,
+    check: bool | None = None,
+    antenna: Antenna | tuple[Antenna, Antenna] | None = None,
+    radar: Radar | None = None,
+    shadows: bool = True,
+    seed: int = 0,
+    max_edge: float | Literal["auto"] | None = "auto",
+    polarization: Polarization | Literal["all"] | Sequence[Polarization] = "HH",
+    vertical: ArrayLike | None = None,
+    reference: ArrayLike | None = None,
+    compressed: bool = True,
+    out: PathLike | None = None,
+    resume: bool | None = None,
+    tile: Tile | None,
+    device: DeviceChoice | None = None,
+    cluster: distributed.Client | None = None,
+    progress: Progress | None = None,
+) -> PhaseHistory | None:
+    """The samples of `echo` for a straight track of evenly spaced pulses, by two-dimensional Fourier transforms.
+    Options: docs/guide/options.md."""
+
+@overload
 def fullwave_echo(
     scene: Scene,
     waveform: Waveform,
@@ -307,6 +352,8 @@ def fullwave_echo(
     anchors: Literal["auto"] | int | Sequence[int] = "auto",
     max_bytes: float | None = None,
     out: PathLike | None = None,
+    resume: bool | None = None,
+    tile: None = None,
     tolerance: float = 0.03,
     check: bool = False,
     model_error: bool = True,
@@ -315,8 +362,37 @@ def fullwave_echo(
     reference: ArrayLike | None = None,
     compressed: bool = True,
     device: DeviceChoice | None = None,
+    cluster: distributed.Client | None = None,
     progress: Progress | None = None,
 ) -> PhaseHistory:
+    """Echoes of closed bodies by a solution of Maxwell's equations on a grid (FDTD): all reflections, diffraction,
+    creeping waves and resonances. Options: docs/guide/options.md."""
+
+@overload
+def fullwave_echo(
+    scene: Scene,
+    waveform: Waveform,
+    track: Trajectory,
+    *,
+    polarization: Polarization | Literal["all"] | Sequence[Polarization] = "HH",
+    range_window: ArrayLike | None = None,
+    cells: Literal["auto"] | float = "auto",
+    anchors: Literal["auto"] | int | Sequence[int] = "auto",
+    max_bytes: float | None = None,
+    out: PathLike | None = None,
+    resume: bool | None = None,
+    tile: Tile | None,
+    tolerance: float = 0.03,
+    check: bool = False,
+    model_error: bool = True,
+    receiver: Trajectory | None = None,
+    vertical: ArrayLike | None = None,
+    reference: ArrayLike | None = None,
+    compressed: bool = True,
+    device: DeviceChoice | None = None,
+    cluster: distributed.Client | None = None,
+    progress: Progress | None = None,
+) -> PhaseHistory | None:
     """Echoes of closed bodies by a solution of Maxwell's equations on a grid (FDTD): all reflections, diffraction,
     creeping waves and resonances. Options: docs/guide/options.md."""
 

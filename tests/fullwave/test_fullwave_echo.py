@@ -2,13 +2,7 @@
 
 from __future__ import annotations
 
-import errno
 import logging
-import os
-import signal
-import subprocess
-import sys
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -21,8 +15,6 @@ from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.base.report import root_sum_square
 from sarcl.fullwave import runs
 from sarcl.fullwave.echoes import _fullwave_task, _grid_choice
-from sarcl.fullwave.echoes._anchor_files import AnchorFiles
-from sarcl.fullwave.runs import RunEnd
 from sarcl.opencl.choose_device import open_device
 from sarcl.reference import mie
 from sarcl.scene.triangles import rotation
@@ -321,15 +313,15 @@ def pretend(monkeypatch, stop_after=None, left=0.0):
     return done
 
 
-def test_an_interrupted_task_continues_from_its_finished_anchors(tmp_path, monkeypatch, caplog):
+def test_an_interrupted_task_continues_from_its_finished_runs(tmp_path, monkeypatch, caplog):
     out, track = tmp_path / "raw.h5", around(20, 65)
     given = {"cells": 8, "model_error": False, "polarization": ("VV", "HV", "HH")}
     assert len(pretend(monkeypatch)) == 0
     whole = sarcl.fullwave_echo(BOX, CHIRP, track, **given)
     pretend(monkeypatch, stop_after=3)
     with pytest.raises(RuntimeError, match="switched off"):
-        sarcl.fullwave_echo(BOX, CHIRP, track, out=out, **given)
-    kept = sorted((tmp_path / "raw.h5.anchors").iterdir())
+        sarcl.fullwave_echo(BOX, CHIRP, track, out=out, resume=True, **given)
+    kept = sorted((tmp_path / "raw.h5.anchors").glob("*.tiles"))
     assert not out.exists() and len(kept) == 3
     damaged = bytearray(kept[0].read_bytes())
     damaged[-100] ^= 1
@@ -337,41 +329,9 @@ def test_an_interrupted_task_continues_from_its_finished_anchors(tmp_path, monke
     kept[1].write_bytes(kept[1].read_bytes()[:20])
     done = pretend(monkeypatch)
     raw = sarcl.fullwave_echo(BOX, CHIRP, track, out=out, **given)
-    assert len(done) == 3 and caplog.text.count("is damaged: this anchor is computed again") == 2
+    assert len(done) == 3 and caplog.text.count("its tiles are made again") == 2
     assert np.array_equal(np.asarray(raw.samples), np.asarray(whole.samples)) and not kept[0].parent.exists()
     assert sarcl.read(out).report.plan["anchors"] == whole.report.plan["anchors"] == [0, 1]
-
-
-def test_anchors_that_find_no_room_are_warned_of_and_the_task_goes_on(tmp_path, monkeypatch):
-    def full(*_):
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    files = AnchorFiles(tmp_path / "raw.h5", "0" * 32)
-    monkeypatch.setattr(os, "replace", full)
-    with pytest.warns(sarcl.SarclWarning, match=r"raw\.h5\.anchors \(No space left on device\): the task goes on"):
-        files.keep(3, "H", np.zeros((4, 1, 8), np.complex64), RunEnd(10, 1e-5))
-    assert not list(files.folder.iterdir())
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"cells": 8.5},
-        {"vertical": (0, 1, 1)},
-        {"track": around(20, 66)},
-        {"scene": shapes.box((0.2, 0.3, 0.11))},
-        {"tolerance": 1e-3},  # runs end when fewer currents are left
-    ],
-)  # fmt: skip
-def test_a_changed_task_takes_no_anchors_of_another(tmp_path, monkeypatch, caplog, change):
-    first = {"scene": BOX, "waveform": CHIRP, "track": around(20, 65), "cells": 8, "out": tmp_path / "raw.h5"}
-    for task in (first, first | change):
-        done = pretend(monkeypatch, stop_after=1)
-        with pytest.raises(RuntimeError, match="switched off"):
-            sarcl.fullwave_echo(**task)
-        assert len(done) == 1
-    assert "holds 1 finished anchors of another task" in caplog.text
-    assert len(list((tmp_path / "raw.h5.anchors").iterdir())) == 2
 
 
 SCENARIO = """
@@ -453,7 +413,7 @@ def test_a_forecast_runs_its_own_plan_which_cuts_the_bodies_once(monkeypatch):
         assert np.array_equal(np.asarray(raw.samples), np.asarray(whole.samples))
         for name in ("predicted_error", "error_terms", "model_error", "contributions_done"):
             assert getattr(raw.report, name) == getattr(whole.report, name)
-        assert set(raw.report.seconds) == {"plan", "runs", "model error"}
+        assert set(raw.report.seconds) == {"plan", "files", "full-wave runs", "forming"}
     assert len(cuts) == 3  # and with the conductivity at the upper end of the band
 
 
@@ -602,100 +562,3 @@ def test_one_run_serves_two_anchors_of_a_body_that_is_its_own_mirror_image(monke
     assert (both.report.plan["runs"], both.report.plan["mirrored"]) == (8, 6)
     assert (alone.report.plan["runs"], alone.report.plan["mirrored"]) == (14, 0)
     assert difference(np.asarray(both.samples), np.asarray(alone.samples)) < 5e-3
-
-
-def test_a_kill_between_the_files_of_a_run_and_of_its_twin_makes_both_again(tmp_path, monkeypatch):
-    given = {"cells": 8, "model_error": False, "anchors": [0, 2], "out": tmp_path / "raw.h5"}
-    track, folder = around(-30, 0, 30), tmp_path / "raw.h5.anchors"
-    real = AnchorFiles.keep
-
-    def kept_once(self, *args):
-        if folder.exists():
-            raise RuntimeError("the machine is switched off")
-        real(self, *args)
-
-    monkeypatch.setattr(AnchorFiles, "keep", kept_once)
-    pretend(monkeypatch)
-    with pytest.raises(RuntimeError, match="switched off"):
-        sarcl.fullwave_echo(BOX, CHIRP, track, **given)
-    assert [path.name[-15:] for path in folder.iterdir()] == ["H-000002.anchor"]
-    monkeypatch.setattr(AnchorFiles, "keep", real)
-    done = pretend(monkeypatch)
-    raw = sarcl.fullwave_echo(BOX, CHIRP, track, **given)
-    assert len(done) == 1 == raw.report.plan["mirrored"]
-
-
-KILLED = """
-import numpy as np, sarcl, sys
-box, chirp = sarcl.shapes.box((0.2, 0.3, 0.1)), sarcl.Waveform.chirp(center=1.25e9, bandwidth=500e6, duration=2e-8)
-angle = np.deg2rad([20, 40, 60, 80])
-track = sarcl.Trajectory(None, np.stack([40 * np.cos(angle), 40 * np.sin(angle), 0 * angle], 1))
-raw = sarcl.fullwave_echo(box, chirp, track, polarization="all", cells=8, out=sys.argv[1])
-"""
-
-
-@pytest.mark.slow
-def test_a_task_that_was_killed_continues_and_gives_the_same_samples(tmp_path):
-    out, folder = tmp_path / "raw.h5", tmp_path / "raw.h5.anchors"
-    command = [sys.executable, "-c", KILLED]
-    running = subprocess.Popen([*command, str(out)])
-    end = time.monotonic() + 300
-    while len(list(folder.glob("*.anchor"))) < 3 and time.monotonic() < end:
-        assert running.poll() is None
-        time.sleep(0.02)
-    os.kill(running.pid, signal.SIGKILL)
-    assert running.wait() == -signal.SIGKILL
-    kept = {path.name: path.read_bytes() for path in folder.glob("*.anchor")}
-    assert 3 <= len(kept) < 8 and not out.exists()
-    subprocess.run([*command, str(out)], check=True)
-    subprocess.run([*command, str(tmp_path / "whole.h5")], check=True)
-    made, whole = sarcl.read(out), sarcl.read(tmp_path / "whole.h5")
-    assert np.array_equal(np.asarray(made.samples), np.asarray(whole.samples))
-    assert made.report.plan["runs"] == 8 - len(kept) and whole.report.plan["runs"] == 8
-    assert not folder.exists() and len(list(tmp_path.iterdir())) == 2
-
-
-KILLED_IN = """
-import os, signal, sys
-import numpy as np, sarcl
-from sarcl.fullwave.echoes import _anchor_files
-out, where = sys.argv[1:]
-box, chirp = sarcl.shapes.box((0.2, 0.3, 0.1)), sarcl.Waveform.chirp(center=1.25e9, bandwidth=500e6, duration=2e-8)
-angle = np.deg2rad([20, 40, 60])
-track = sarcl.Trajectory(None, np.stack([40 * np.cos(angle), 40 * np.sin(angle), 0 * angle], 1))
-calls, n_files = [], lambda: len([n for n in os.listdir(out + ".anchors") if n.endswith(".anchor")])
-
-def die():
-    os.kill(os.getpid(), signal.SIGKILL)
-
-def in_a_run(stage, done, total):
-    if os.path.isdir(out + ".anchors") and n_files() == 2:
-        calls.append(done)
-        if len(calls) == 3:  # the third run has done some of its windows
-            assert calls[0] < calls[1] < calls[2] < total
-            die()
-
-replace = os.replace
-if where == "file":
-    _anchor_files.os.replace = lambda *names: replace(*names) if n_files() < 2 else die()
-raw = sarcl.fullwave_echo(
-    box, chirp, track, cells=8, anchors=[0, 1, 2], model_error=False, out=out,
-    progress=in_a_run if where == "run" else None,
-)
-"""
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("where", ["run", "file"])
-def test_a_kill_in_the_middle_of_a_run_or_of_its_file_leaves_the_finished_anchors(tmp_path, where):
-    out, folder = tmp_path / "raw.h5", tmp_path / "raw.h5.anchors"
-    command = [sys.executable, "-c", KILLED_IN]
-    killed = subprocess.run([*command, str(out), where])
-    assert killed.returncode == -signal.SIGKILL and not out.exists()
-    assert len(list(folder.glob("*.anchor"))) == 2 and len(list(folder.iterdir())) == 2 + (where == "file")
-    subprocess.run([*command, str(out), ""], check=True)
-    subprocess.run([*command, str(tmp_path / "whole.h5"), ""], check=True)
-    resumed, whole = sarcl.read(out), sarcl.read(tmp_path / "whole.h5")
-    assert np.array_equal(np.asarray(resumed.samples), np.asarray(whole.samples))
-    assert (resumed.report.plan["runs"], whole.report.plan["runs"]) == (1, 3)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["raw.h5", "whole.h5"]

@@ -196,7 +196,8 @@ def bands(raw):
 def found(raw, path):
     """Runs of bands in the files beside an image, read and checked."""
     task, chosen = make_task(raw, GRID, None, None, False, True), planned(raw)
-    files = tile_files.TileStore(tile_files.folder_of(path), image_job(task, chosen, 1e-3))
+    job = image_job(task, chosen, 1e-3)
+    files = tile_files.TileStore(tile_files.folder_of(path, job), job)
     return [run for run, _, _ in files.found(0, chosen.tiling.n_bands)]
 
 

@@ -12,7 +12,7 @@ from ...base.report import root_sum_square
 from ...base.text import duration, size_text
 from ...io import sarcl_hdf5
 from ...model.phase_history import PhaseHistory
-from ..anchors import ENOUGH
+from ..anchors import ENOUGH, FIRST
 from ._formed_samples import error_terms
 from ._fullwave_task import LEFT, FullwaveTask
 from ._grid_choice import SHARE
@@ -39,10 +39,11 @@ def forecast_of(
     speed, n_sent = run_speed(task.device), len(task.sendings)
     n_anchors, n_parts = expected_anchors(task, anchors), len(task.parts)
     n_runs, each = n_anchors * n_sent * n_parts, run_seconds(task, speed)
-    seconds = (n_runs + task.options.check * n_sent * n_parts) * each
+    others = [each * n_parts] * (task.options.check * n_sent)
     if coarse:
-        n_coarse = (2 if task.losses else 1) * n_sent * len(coarse.parts)
-        seconds += n_coarse * run_seconds(coarse, speed)
+        others += [run_seconds(coarse, speed) * len(coarse.parts)] * ((2 if task.losses else 1) * n_sent)
+    lanes = task.options.speedup(task.devices)
+    seconds = sum(max(sum(r) / lanes, max(r)) for r in rounds(anchors, n_anchors, n_sent, each * n_parts, others) if r)
     n_rows, n_samples = len(task.tx) * len(task.polarizations), len(task.frequencies)
     memory = f"{SHARE:g} of what is installed" if task.options.max_bytes is None else "as given"
     plan: dict[str, object] = {
@@ -79,10 +80,22 @@ def forecast_of(
     )
 
 
+def rounds(
+    anchors: str | int | np.ndarray, n_anchors: int, n_sent: int, each: float, others: list[float]
+) -> list[list[float]]:
+    """Seconds of runs that can be computed at the same time, of those after them, and so on.
+
+    each  seconds of the run of an anchor;  others  of the runs that anchors are compared with
+    """
+    if not isinstance(anchors, str):
+        return [[each] * (n_anchors * n_sent) + others]
+    first = min(n_anchors, len(FIRST))
+    return [[each] * (first * n_sent), *([each] * n_sent for _ in range(n_anchors - first)), others]
+
+
 def echo_bytes(task: FullwaveTask, n_anchors: int) -> float:
     """Memory of the echoes of all pulses formed from each anchor, and of a copy of them, which are interpolated."""
-    n_received = max(len(indices) for _, indices in task.sendings)
-    return 2.0 * 8 * n_anchors * len(task.tx) * n_received * len(task.frequencies)
+    return 2.0 * 8 * n_anchors * len(task.tx) * len(task.polarizations) * len(task.frequencies)
 
 
 def is_cut(task: FullwaveTask) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,13 +10,12 @@ import numpy as np
 from ...base.report import SMALLER_TOLERANCE, ErrorTerm, Report, root_sum_square
 from ...base.stage_timer import Clock
 from ...base.validation import array, choice, count, ndim
-from ..anchors import Anchored, anchored
-from ._anchor_files import AnchorFiles
-from ._anchor_runs import AnchorRuns, RunCounts
+from ..anchors import Anchored, Search, anchor_search
 from ._fullwave_task import FullwaveTask
+from ._grid_runs import GridRuns, anchors_of
 from ._model_error import grid_error
 from ._options import FullwaveOptions
-from ._run_progress import RunProgress
+from ._run_bands import ANCHOR, CHECK, COARSE, LOSSES, Run
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,45 +28,79 @@ class FormedSamples:
     report: Report
 
 
-def formed_samples(
-    task: FullwaveTask,
-    coarse: FullwaveTask | None,
-    anchors: str | int | np.ndarray,
-    files: AnchorFiles | None,
-    clock: Clock,
-) -> FormedSamples:
-    """Runs the anchors of every polarisation that is sent, and forms the samples.
+class AnchorSearches:
+    """The anchors of all polarisations that are sent, found together, so that their runs can be computed together."""
 
-    coarse  the task on larger cells that predicts the error of the grid, or None;  files  for finished anchors, or None
-    """
-    options, n_pulses = task.options, len(task.tx)
-    samples = np.empty((n_pulses, len(task.polarizations), len(task.frequencies)), np.complex64)
-    progress = RunProgress(options.progress, 1, task.cost.steps)
-    sums, counts = ErrorSums(), RunCounts()
+    def __init__(self, task: FullwaveTask, coarse: FullwaveTask | None, anchors: str | int | np.ndarray) -> None:
+        """coarse  the task on larger cells that predicts the error of the grid, or None"""
+        self.task, self.coarse, self._searches = task, coarse, dict[str, Search]()
+        for sent, _ in task.sendings:
+            twins = task.twins[sent]
+            mirror = np.array([twins[p].pulse if p in twins else -1 for p in range(len(task.tx))])
+            self._searches[sent] = anchor_search(
+                task.along, anchors=anchors, tolerance=task.options.tolerance, mirror=mirror
+            )
+        self._asked = {sent: next(search) for sent, search in self._searches.items()}
+        self.first = self._runs()
+        if not isinstance(anchors, str):  # all anchors are known, and so is what is compared with them
+            self.first += [run for sent, pulses in self._asked.items() for run in self._others(sent, pulses)]
+
+    def _runs(self) -> list[Run]:
+        return [run for sent, pulses in self._asked.items() for run in anchors_of(sent, pulses)]
+
+    def _others(self, sent: str, anchors: Iterable[int]) -> list[Run]:
+        """Runs that echoes from some anchors are compared with: for the check, and for the error of the grid."""
+        others = []
+        if self.task.options.check:
+            others.append(Run(CHECK, sent, farthest_pulse(self.task, anchors)))
+        if self.coarse:
+            pulse = middle_anchor(self.task, anchors)
+            others += [Run(kind, sent, pulse) for kind in ((COARSE, LOSSES) if self.task.losses else (COARSE,))]
+        return others
+
+    def found(self, runs: GridRuns) -> dict[str, Anchored]:
+        """Run all anchors, and what they are compared with; the echoes of each polarisation that is sent."""
+        runs.compute(self.first)
+        found: dict[str, Anchored] = {}
+        while self._asked:
+            runs.compute(self._runs())
+            for sent, pulses in list(self._asked.items()):
+                echoes = [runs.echoes(run) for run in anchors_of(sent, pulses)]
+                try:
+                    self._asked[sent] = self._searches[sent].send(echoes)
+                except StopIteration as end:
+                    found[sent] = end.value
+                    del self._asked[sent]
+        runs.compute(run for sent, one in found.items() for run in self._others(sent, one.pulses))
+        return {sent: found[sent] for sent, _ in self.task.sendings}
+
+
+def formed_samples(searches: AnchorSearches, runs: GridRuns, clock: Clock) -> FormedSamples:
+    """Runs the anchors of every polarisation that is sent, and forms the samples."""
+    task = searches.task
+    samples = np.empty((len(task.tx), len(task.polarizations), len(task.frequencies)), np.complex64)
+    sums = ErrorSums()
+    found = searches.found(runs)
     for sent, indices in task.sendings:
-        twins = task.twins[sent]
-        runs = AnchorRuns(
-            task,
-            sent,
-            [task.polarizations[i][0] for i in indices],
-            files=files,
-            progress=progress,
-            twins=twins,
-            counts=counts,
-        )
-        mirror = np.array([twins[p].pulse if p in twins else -1 for p in range(n_pulses)])
-        echoes = anchored(runs, task.along, anchors=anchors, tolerance=options.tolerance, mirror=mirror)
-        clock.lap("runs")
-        samples[:, indices] = echoes.samples
-        sums.add(task, sent, echoes)
-        if coarse:
-            sums.add_grid_error(task, coarse, runs)
-            clock.lap("model error")
-        if options.check:
-            sums.add_check(task, runs, echoes)
-            clock.lap("check")
-    progress.finish()
-    return FormedSamples(samples, _report(task, sums, counts, clock))
+        samples[:, indices] = found[sent].samples
+        sums.add(task, sent, found[sent])
+        if searches.coarse:
+            sums.add_grid_error(task, searches.coarse, runs, sent)
+        if task.options.check:
+            sums.add_check(task, runs, sent, found[sent])
+    clock.lap("forming")
+    return FormedSamples(samples, _report(task, sums, runs, clock))
+
+
+def middle_anchor(task: FullwaveTask, anchors: Iterable[int]) -> int:
+    """The pulse of the anchor that is nearest to the middle of the track."""
+    middle = (task.along[0] + task.along[-1]) / 2
+    return min(sorted(map(int, anchors)), key=lambda p: abs(task.along[p] - middle))
+
+
+def farthest_pulse(task: FullwaveTask, anchors: Iterable[int]) -> int:
+    """The pulse that is farthest from every anchor."""
+    return int(np.argmax(np.abs(task.along[:, None] - task.along[list(anchors)]).min(axis=1)))
 
 
 def checked_anchors(asked: object, n_pulses: int) -> str | int | np.ndarray:
@@ -118,18 +152,16 @@ class ErrorSums:
         if np.ptp(task.along):  # else one run is that of every pulse
             self.forming += echoes.predicted_error**2 * power
 
-    def add_grid_error(self, task: FullwaveTask, coarse: FullwaveTask, runs: AnchorRuns) -> None:
+    def add_grid_error(self, task: FullwaveTask, coarse: FullwaveTask, runs: GridRuns, sent: str) -> None:
         """Add the error of the grid, predicted at the middle anchor."""
-        middle = (task.along[0] + task.along[-1]) / 2
-        pulse = min(self.anchors[runs.sent], key=lambda p: abs(task.along[p] - middle))
-        error, power = grid_error(task, coarse, pulse, runs)
+        pulse = middle_anchor(task, self.anchors[sent])
+        error, power = grid_error(task, coarse, runs, Run(ANCHOR, sent, pulse))
         self.grid, self.grid_power, self.has_grid = self.grid + error, self.grid_power + power, True
 
-    def add_check(self, task: FullwaveTask, runs: AnchorRuns, echoes: Anchored) -> None:
+    def add_check(self, task: FullwaveTask, runs: GridRuns, sent: str, echoes: Anchored) -> None:
         """Add the error at the pulse that is farthest from every anchor, by a run; it counts for all pulses."""
-        distance = np.abs(task.along[:, None] - task.along[self.anchors[runs.sent]]).min(axis=1)
-        pulse = int(np.argmax(distance))
-        exact = task.formed(pulse, runs.sent, runs.received, np.array([pulse]), runs.progress)[0][0][0]
+        pulse = farthest_pulse(task, self.anchors[sent])
+        exact = runs.echoes(Run(CHECK, sent, pulse))[0]
         error = float((np.abs((echoes.samples[pulse] - exact) * np.abs(task.spectrum)) ** 2).sum())
         self.checked, self.has_check = self.checked + len(task.tx) * error, True
 
@@ -149,8 +181,8 @@ class ErrorSums:
         return float(np.sqrt(self.grid / self.grid_power)) if self.has_grid and self.grid_power else None
 
 
-def _report(task: FullwaveTask, sums: ErrorSums, counts: RunCounts, clock: Clock) -> Report:
-    pulses = list(sums.anchors.values())
+def _report(task: FullwaveTask, sums: ErrorSums, runs: GridRuns, clock: Clock) -> Report:
+    pulses, counts = list(sums.anchors.values()), runs.total
     plan: dict[str, object] = {
         "model": "full wave on a grid (FDTD)",
         "anchors": pulses[0] if all(p == pulses[0] for p in pulses) else sums.anchors,
@@ -166,6 +198,7 @@ def _report(task: FullwaveTask, sums: ErrorSums, counts: RunCounts, clock: Clock
         **task.strips,
         **task.losses,
         **task.motion,
+        **({"from files": f"{runs.from_files} runs"} if runs.from_files else {}),
     }
     terms = error_terms(sums.forming_error, counts.left, task.options)
     return Report(
@@ -176,6 +209,6 @@ def _report(task: FullwaveTask, sums: ErrorSums, counts: RunCounts, clock: Clock
         measured_error=sums.measured_error,
         contributions_done=counts.steps * task.n_cells,
         seconds=clock.seconds,
-        device=task.device.info.name,
+        device=" + ".join(runs.filler.workers.names),
         model_error=sums.model_error,
     )

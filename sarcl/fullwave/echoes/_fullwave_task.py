@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -10,13 +11,10 @@ import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.errors import ToleranceUnreachable, TooThin, warn
-from ...base.fingerprint import checksum, kernels, leaves
 from ...base.vectors import unit
-from ...base.version import __version__
 from ...model.trajectory import Trajectory
 from ...model.waveform import Waveform
 from ...numerics.pulse_geometry import half_path
-from ...opencl.choose_device import open_device
 from ...opencl.device import Device
 from ...opencl.memory_budget import budget
 from ...scattering.physical_optics import polarisation
@@ -30,12 +28,12 @@ from ._antenna_geometry import angle_along, check_outside, window_of
 from ._closed_bodies import check_bodies, check_wavelengths, losses_said, parts_of
 from ._grid_choice import check_cells, chosen_cells, default_bytes, grid_choice
 from ._options import FullwaveOptions
-from ._run_progress import RunProgress
 
 LEFT = 1 / 30  # of the tolerance: currents that may come after the end of a run
 # wavelengths, at the highest frequency: widest strip thinner than a cell that is a sheet on the grid, far from the
 # quarter of a wavelength at which strips on a body resonate. Wider parts are plates or masts, and refused
 STRIP = 0.1
+MOST_SHOWN = 0.999  # of a run, as progress shows it, until it has ended: it may take longer than expected
 LEAST_TOLERANCE = 1e-4  # fields in float32, and currents until they have decayed to a part of 1e-5
 
 
@@ -44,6 +42,7 @@ class FullwaveTask:
     """Echoes to be computed, and the grid for them: the checked problem.
 
     options           as they were asked for;  polarizations, vertical  names, and a unit vector (3,)
+    device, devices   the device of its runs; all of this process that share them
     band              lowest and highest frequency of the waveform, Hz
     track, receiver   antennas while pulses are on their way;  motion  entries of a plan about them
     reference_range   m (P,);  window  m (near, far);  frequencies  Hz (F,);  step  Hz
@@ -56,6 +55,7 @@ class FullwaveTask:
 
     options: FullwaveOptions
     device: Device
+    devices: tuple[Device, ...]
     polarizations: tuple[str, ...]
     vertical: np.ndarray
     scene: Scene
@@ -75,6 +75,16 @@ class FullwaveTask:
     along: np.ndarray
     strip: float
     exact: float | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """For another process: without what belongs to this one."""
+        return {**self.__dict__, "options": self.options.portable(), "device": None, "devices": ()}
+
+    def on(self, device: Device) -> FullwaveTask:
+        """The same task on another device, with the bodies as they are cut."""
+        other = replace(self, device=device)
+        other.__dict__.update({name: self.__dict__[name] for name in ("target", "twins") if name in self.__dict__})
+        return other
 
     @property
     def tx(self) -> np.ndarray:
@@ -190,29 +200,36 @@ class FullwaveTask:
         sent: str,
         received: list[str],
         pulses: np.ndarray,
-        progress: RunProgress,
+        progress: Callable[[float], None],
         twin: Twin | None = None,
     ) -> tuple[list[np.ndarray], runs.RunEnd]:
         """Echoes (n, Q, F) at some pulses (n,), formed from the currents of an anchor at one pulse, phase zero at the
         centre, and from those of its twin, where one is given; and how the runs ended.
+
+        progress  called with the share of the work that is done
         """
         tx, rx = self.tx[pulses], self.rx[pulses]
         senses = self.senses(rx)
         shape = len(pulses), len(received), len(self.frequencies)
         formed = [np.empty(shape, np.complex64) for _ in range(1 + (twin is not None))]
         path = half_path(tx, rx, runs.centre_of(self.lattice)) - half_path(tx, rx, self.centre)
-        steps, left = 0, 0.0
-        for part in self.parts:
+        steps, left, parts, shown = 0, 0.0, self.parts, 0.0
+        for number, part in enumerate(parts):
+
+            def share_done(done: int, expected: int, before: int = number) -> None:
+                nonlocal shown
+                shown = max(shown, (before + min(done / max(expected, 1), MOST_SHOWN)) / len(parts))
+                progress(shown)
+
             part_echoes, ended = runs.run(
                 self.device, self.lattice, self.target, self.band, self.wavenumbers[part],
                 anchor=(self.tx[pulse], self.senses(self.tx[pulse])[sent]), twin=twin, tx=tx, rx=rx,
                 received=np.stack([senses[name] for name in received]), tolerance=LEFT * self.options.tolerance,
-                most_steps=int(runs.MOST_STEPS * self.cost.steps), max_bytes=self.max_bytes, progress=progress,
+                most_steps=int(runs.MOST_STEPS * self.cost.steps), max_bytes=self.max_bytes, progress=share_done,
             )  # fmt: skip
             turn = np.exp(-2j * np.outer(path, self.wavenumbers[part]))[:, None]
             for whole_band, echoes in zip(formed, part_echoes, strict=True):
                 whole_band[..., part] = echoes * turn
-            progress.run_done()
             steps, left = steps + ended.steps, max(left, ended.left)
         return formed, runs.RunEnd(steps, left)
 
@@ -226,19 +243,6 @@ class FullwaveTask:
         """Factors of formed echoes: the spectrum, and the phase from the centre to the reference range, (n, F)."""
         path = half_path(self.tx[pulses], self.rx[pulses], self.centre) - self.reference_range[pulses]
         return np.asarray(self.spectrum * np.exp(-2j * np.outer(path, self.wavenumbers)))
-
-    def fingerprint(self) -> str:
-        """Checksum of all that echoes formed from an anchor depend on."""
-        parts: dict[str, Any] = {
-            "sarcl": f"{__version__}, kernels {kernels()}",
-            "bodies": [self.scene.triangles, self.scene.material, self.scene.materials],
-            "antennas": [self.tx, self.rx, self.vertical],
-            "polarizations": ", ".join(self.polarizations),
-            "frequencies": self.frequencies,
-            "grid": [self.cells, self.band, self.lattice, len(self.parts)],
-            "end of runs": self.options.tolerance,
-        }
-        return checksum(*leaves(parts))
 
     def coarser(self, ratio: float, finer: float) -> FullwaveTask:
         """The same task with cells larger by a factor, divided by up to `finer`. Strips thinner than a cell are wider
@@ -257,7 +261,7 @@ class FullwaveTask:
 def fullwave_task(scene: Scene, waveform: Waveform, track: Trajectory, options: FullwaveOptions) -> FullwaveTask:
     """The task of fullwave_echo, on a grid that is chosen. ValueError, MemoryError: what does not fit."""
     tolerance = options.tolerance
-    device = open_device(options.device)
+    devices = options.devices()
     check_bodies(scene)
     band = waveform.center - waveform.bandwidth / 2, waveform.center + waveform.bandwidth / 2
     cells = check_cells(chosen_cells(options.cells, scene, band[1], tolerance), band)
@@ -271,11 +275,13 @@ def fullwave_task(scene: Scene, waveform: Waveform, track: Trajectory, options: 
     reference_range = half_path(tx, rx, point)
     window = window_of(scene, waveform, tx, rx, reference_range, options.range_window)
     frequency, step, n_samples = echo_sampling.sampling(waveform, *window, options.compressed)
-    max_bytes = default_bytes(device) if options.max_bytes is None else budget(device, options.max_bytes)
+    most = options.max_bytes  # one number for all devices: the band is divided alike on each
+    max_bytes = min(default_bytes(device) if most is None else budget(device, most) for device in devices)
     lattice, cost = grid_choice(scene, band, cells, max_bytes)
     return FullwaveTask(
         options=options,
-        device=device,
+        device=devices[0],
+        devices=devices,
         polarizations=tuple(options.polarization),
         vertical=options.vertical_at(scene.center),
         scene=scene,

@@ -24,37 +24,32 @@ import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.errors import TooThin
-from ._anchor_runs import AnchorRuns
 from ._closed_bodies import parts_of
 from ._fullwave_task import FullwaveTask
+from ._grid_runs import GridRuns
+from ._run_bands import COARSE, LOSSES, Run
 
 RATIO = 1.5  # of the cells, about: such a run takes a fifth of the time, 1.5^-4
 FINER = 1.15  # by which its cells may be smaller, so that flat sides lie on nodes
 # powers of the size of cells with which errors fall, measured: docs/theory/full_wave_bodies.md
 CONDUCTOR, SHEETS, DIELECTRIC, LOSSY = 1.5, 1.0, 2.0, 1.25
 LOSS = 0.05  # of a permittivity, imaginary over real part, from which on a body counts as lossy
-MOST_PULSES = 32  # at which echoes are compared
 
 
-def grid_error(task: FullwaveTask, coarse: FullwaveTask, pulse: int, runs: AnchorRuns) -> tuple[float, float]:
-    """Predicted power of the error of the samples (P, Q, F) formed from the anchor at a pulse, and their power."""
-    echoes = runs(pulse)
-    n = len(echoes)
-    pulses = np.unique(np.append(np.linspace(0, n - 1, min(MOST_PULSES, n)).round().astype(int), pulse))
-
-    def formed(other: FullwaveTask) -> np.ndarray:
-        return other.formed(pulse, runs.sent, runs.received, pulses, runs.progress)[0][0]
-
-    coarse_echoes = formed(coarse)
+def grid_error(task: FullwaveTask, coarse: FullwaveTask, runs: GridRuns, anchor: Run) -> tuple[float, float]:
+    """Predicted power of the error of the samples (P, Q, F) formed from an anchor, and their power."""
+    compared = anchor._replace(kind=COARSE)
+    coarse_echoes = runs.echoes(compared)
     weight = np.abs(task.spectrum)
-    weighted = echoes[pulses] * weight
+    weighted = runs.echoes(anchor)[runs.bands.pulses(compared)] * weight
     ratio = coarse.lattice.cell / task.lattice.cell
     error = float(np.linalg.norm(coarse_echoes * weight - weighted)) / (ratio ** order(task) - 1)
     losses = 0.0
     if task.losses:
         upper, centre = task.band[1], task.waveform.center
         share = (task.frequencies - centre) / (upper - centre)
-        losses = float(np.linalg.norm((formed(coarse.with_upper_losses) - coarse_echoes) * share * weight))
+        upper_echoes = runs.echoes(anchor._replace(kind=LOSSES))
+        losses = float(np.linalg.norm((upper_echoes - coarse_echoes) * share * weight))
     return error**2 + losses**2, float(np.linalg.norm(weighted)) ** 2
 
 

@@ -11,11 +11,12 @@ from numpy.typing import ArrayLike
 from ...base.options import option
 from ...base.types import PathLike
 from ...base.validation import flag
+from ...blocks.block_options import BlockOptions, Tile
 from ...simulation.track_options import Polarization, TrackOptions, file_name, polarizations
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class FullwaveOptions(TrackOptions):
+class FullwaveOptions(TrackOptions, BlockOptions):
     """Options of `fullwave_echo`."""
 
     polarization: Polarization | Literal["all"] | Sequence[Polarization] = option(
@@ -45,9 +46,23 @@ class FullwaveOptions(TrackOptions):
     )
     out: PathLike | None = option(
         None,
-        "an HDF5 file of sarcl's (.h5) for the samples. Echoes of finished anchors are kept beside it, in OUT.anchors, "
+        "an HDF5 file of sarcl's (.h5) for the samples. Echoes of finished runs are kept beside it, in OUT.anchors, "
         "until it is complete: after a kill, the same call continues from them",
         file_name,
+        in_files=False,
+    )
+    resume: bool | None = option(
+        None,
+        'whether echoes of finished runs are kept in "PATH.anchors", where the same call finds them if it is killed. '
+        "None: they are kept from the first second on; True: also when the call ends in an exception; False: they are "
+        "not kept, and those of earlier calls are deleted",
+        in_files=False,
+    )
+    tile: Tile | None = option(
+        None,
+        '(i, n): compute only piece i of n of the runs, 1 <= i <= n, and keep their echoes in "PATH.anchors"; the call '
+        'that finds all others finished returns the echoes, the others return None. With anchors="auto", pieces share '
+        "the first runs, and the call that completes these does the others",
         in_files=False,
     )
     tolerance: float = option(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,19 +13,21 @@ from ...base.forecast import Forecast, Plan
 from ...base.stage_timer import Clock
 from ...base.validation import instance
 from ...base.verb import verb
-from ...io import formats, output_paths
+from ...blocks.fill_bands import BandFiller
 from ...model.phase_history import PhaseHistory
 from ...model.trajectory import Trajectory
 from ...model.waveform import Waveform
 from ...opencl.memory_budget import budget
 from ...scene.scene import Scene
+from ...simulation.echo_files import EchoFiles
 from ...simulation.echo_output import EchoOutput
-from ._anchor_files import AnchorFiles
 from ._forecast import forecast_of, is_cut
-from ._formed_samples import FormedSamples, checked_anchors, formed_samples
+from ._formed_samples import AnchorSearches, checked_anchors, formed_samples
 from ._fullwave_task import FullwaveTask, fullwave_task
+from ._grid_runs import GridRuns, RunProgress, run_job
 from ._model_error import check_thickness, coarse_task
 from ._options import FullwaveOptions
+from ._run_bands import RunBands, RunEngine, RunRecipe
 
 
 @verb(FullwaveOptions)
@@ -41,9 +44,11 @@ def fullwave_echo(scene: Scene, waveform: Waveform, track: Trajectory, options: 
     waveform      whose band the grid carries;  track  transmitter, outside the sphere about the scene's box
     {options}
 
-    Returns a PhaseHistory whose samples are like those of `echo`: |sample|^2 = RCS, m^2. ToleranceUnreachable, a
-    ValueError: more anchors do not meet the tolerance. ToleranceMissed, a ValueError that holds the finished echoes:
-    the check measured more than the tolerance. ValueError, MemoryError, sarcl.NoDeviceError say what else does not fit.
+    Returns a PhaseHistory whose samples are like those of `echo`: |sample|^2 = RCS, m^2; with `tile`, None until the
+    piece that completes it. ToleranceUnreachable, a ValueError: more anchors do not meet the tolerance.
+    ToleranceMissed, a ValueError that holds the finished echoes: the check measured more than the tolerance.
+    ValueError: runs of other echoes in "PATH.anchors". ValueError, MemoryError, sarcl.NoDeviceError say what else does
+    not fit.
 
     Its forecast estimates the number of anchors from the length of the target in wavelengths, the angle that the track
     covers and the tolerance: with anchors="auto" the runs themselves decide. forecast.bytes is the memory of one run of
@@ -58,8 +63,9 @@ def fullwave_echo(scene: Scene, waveform: Waveform, track: Trajectory, options: 
     task = fullwave_task(scene, waveform, track, options)
     coarse = coarse_task(task) if options.model_error else None
     anchors = checked_anchors(options.anchors, len(task.along))
+    piece = options.piece(options.out is not None, "raw.h5")
     clock.lap("plan")
-    return FullwavePlan(task, coarse, anchors, clock.seconds)
+    return FullwavePlan(task, coarse, anchors, clock.seconds, piece)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,12 +74,14 @@ class FullwavePlan:
 
     coarse   the task on larger cells that predicts the model error, or None
     anchors  "auto", their number, or their pulses (n,);  seconds  of planning, by stage
+    piece    (i, n) where only that piece of the runs is computed
     """
 
     task: FullwaveTask
     coarse: FullwaveTask | None
     anchors: str | int | np.ndarray
     seconds: dict[str, float]
+    piece: tuple[int, int] | None = None
 
     def forecast(self) -> Forecast[PhaseHistory]:
         """Its Forecast. A small grid is timed, once per device and process."""
@@ -82,19 +90,31 @@ class FullwavePlan:
         return forecast_of(self.task, self.coarse, self.anchors, sum(self.seconds.values()), self.run)
 
     def run(self) -> PhaseHistory:
-        """The echoes, in memory or in the file `out`."""
-        out = self.task.options.out
-        if out is not None:
-            formats.writer_functions(out, "phase history")
-            output_paths.check_writable(out)
+        """The echoes, in memory or in the file `out`; None for a piece while others are missing."""
+        with ExitStack() as stack:
+            raw = self._echoes(stack)
+        if raw is not None:
+            confirm_tolerance(raw=raw, instead="give more anchors")
+        return raw  # type: ignore[return-value]
+
+    def _echoes(self, stack: ExitStack) -> PhaseHistory | None:
+        task, options = self.task, self.task.options
+        bands = RunBands(task, self.coarse)
+        job = run_job(task, bands, self.anchors)
+        files = EchoFiles(stack, job, self._output, out=options.out, resume=options.resume, piece=self.piece)
+        if (finished := files.finished()) is not None:
+            return finished
         self._cut()
-        files = None if out is None else AnchorFiles(out, self.task.fingerprint())
-        echoes = formed_samples(self.task, self.coarse, self.anchors, files, Clock(self.seconds))
-        raw = self._written(echoes)
-        if files is not None:
-            files.clear()  # the file of the samples is complete
-        confirm_tolerance(raw=raw, instead="give more anchors")
-        return raw
+        clock, progress = Clock(self.seconds), RunProgress(options.progress)
+        workers = options.workers(job, RunRecipe(bands), task.devices, RunEngine(bands, task.device))
+        runs = GridRuns(bands, BandFiller(workers, job, files.checkpoint, clock, progress), progress)
+        searches = AnchorSearches(task, self.coarse, self.anchors)
+        output = files.output(runs.filler, runs.needed(searches.first))
+        if output is None:
+            return None
+        echoes = formed_samples(searches, runs, clock)
+        self._write(echoes.samples, output)
+        return files.finish(**self._fields(), report=echoes.report)
 
     def _cut(self) -> None:
         """Cut the bodies by both grids, unless they are cut; warn of gaps. ValueError for parts that are too thin."""
@@ -105,34 +125,41 @@ class FullwavePlan:
         clock.lap("plan")
         self.seconds.update(clock.seconds)
 
-    def _written(self, echoes: FormedSamples) -> PhaseHistory:
-        """The samples, with their geometry and report, in memory or in the file `out`."""
+    def _output(self) -> EchoOutput:
+        """Destination of the samples."""
         task = self.task
-        names, n_pulses = task.polarizations, len(task.tx)
+        shape = len(task.tx), len(task.polarizations), len(task.frequencies)
         room = budget(task.device, task.options.max_bytes)
-        with EchoOutput(echoes.samples.shape, task.options.out, room, task.window) as output:
-            for start in range(0, n_pulses, output.pulses):
-                stop = min(start + output.pulses, n_pulses)
-                block = output.block(start, stop)
-                block[...] = echoes.samples[start:stop] * task.factors(slice(start, stop))[:, None]
-                output.keep(start, block)
+        return EchoOutput(shape, task.options.out, room, task.window, resumes=True)
 
-            def every(values: Any) -> Any:
-                return values if len(names) == 1 or values is None else np.repeat(values, len(names), axis=0)
+    def _write(self, samples: np.ndarray, output: EchoOutput) -> None:
+        """Write samples, with the waveform's spectrum, to the output."""
+        for start in range(0, len(samples), output.pulses):
+            stop = min(start + output.pulses, len(samples))
+            block = output.block(start, stop)
+            block[...] = samples[start:stop] * self.task.factors(slice(start, stop))[:, None]
+            output.keep(start, block)
 
-            velocities = [t.velocities for t in (task.track, task.track if task.receiver is None else task.receiver)]
-            return output.finish(
-                frequency=task.frequencies[0],
-                frequency_step=task.step,
-                tx=every(task.tx),
-                rx=None if task.receiver is None else every(task.rx),
-                reference_range=every(task.reference_range),
-                time=every(task.track.times),
-                polarization=np.tile(names, n_pulses),
-                tx_velocity=every(velocities[0]),
-                rx_velocity=every(velocities[1]),
-                waveform=task.waveform,
-                array=None,
-                compressed=task.options.compressed,
-                report=echoes.report,
-            )
+    def _fields(self) -> dict[str, Any]:
+        """Fields of the PhaseHistory but samples and report."""
+        task = self.task
+        names = task.polarizations
+
+        def every(values: Any) -> Any:
+            return values if len(names) == 1 or values is None else np.repeat(values, len(names), axis=0)
+
+        velocities = [t.velocities for t in (task.track, task.track if task.receiver is None else task.receiver)]
+        return {
+            "frequency": task.frequencies[0],
+            "frequency_step": task.step,
+            "tx": every(task.tx),
+            "rx": None if task.receiver is None else every(task.rx),
+            "reference_range": every(task.reference_range),
+            "time": every(task.track.times),
+            "polarization": np.tile(names, len(task.tx)),
+            "tx_velocity": every(velocities[0]),
+            "rx_velocity": every(velocities[1]),
+            "waveform": task.waveform,
+            "array": None,
+            "compressed": task.options.compressed,
+        }

@@ -22,6 +22,7 @@ For this folder alone:
     _planning_time          how long a plan may take
     _scatterer_amplitudes   amplitudes of points and facets, seen from places on the track
     _scratch                complex arrays in memory or in temporary files
+    _spectral_blocks        spectra as a job that is computed in blocks
     _spectral_options       options of spectral_echo
     _spectral_part          points or facets: plan, and spectra along the track
     _spectral_plan          the plan of spectral echoes, and its run

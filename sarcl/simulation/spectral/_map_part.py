@@ -8,12 +8,53 @@ from pathlib import Path
 
 import numpy as np
 
+from ...blocks.bands import FlatArray
 from ...opencl.device import Device
 from ._aspect_window import DopplerGrid
 from ._azimuth_transfer import AzimuthTransfer
 from ._map_plan import MapPlan, RangeWavenumbers
-from ._map_spectrum import ReflectivityMap
+from ._map_spectrum import ReflectivityMap, whole_vectors
 from ._scratch import Scratch
+
+
+@dataclass(frozen=True, eq=False)
+class SpectrumRows:
+    """Spectra of a map in one polarisation, at wavenumbers first ... stop - 1 of its grid, in the rows of an array.
+
+    flat, start  the array, and its row of the grid's first wavenumber
+    """
+
+    polarization: int
+    first: int
+    stop: int
+    flat: FlatArray
+    start: int
+
+    def _rows(self, wavenumbers: slice) -> slice:
+        return slice(self.start + wavenumbers.start, self.start + wavenumbers.stop)
+
+    @property
+    def _is_in_memory(self) -> bool:
+        """Whether rows of the array are views of it."""
+        return not isinstance(self.flat, Scratch) or self.flat.whole is not None
+
+    def sums(self, wavenumbers: slice) -> np.ndarray:
+        """What is added up so far."""
+        return self.flat[self._rows(wavenumbers)]
+
+    def zeros(self, wavenumbers: slice) -> np.ndarray:
+        """Zeros, to begin with."""
+        if not self._is_in_memory:
+            assert isinstance(self.flat, Scratch)
+            return np.zeros((wavenumbers.stop - wavenumbers.start, self.flat.shape[1]), np.complex64)
+        rows = self.sums(wavenumbers)
+        rows[...] = 0
+        return rows
+
+    def put(self, wavenumbers: slice, rows: np.ndarray) -> None:
+        """Keep the rows that `sums` or `zeros` gave."""
+        if not self._is_in_memory:
+            self.flat[self._rows(wavenumbers)] = rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,19 +90,21 @@ class MapPart:
         return ReflectivityMap(device, self.map, self.numbers, self.grid, self.azimuth, self.slant_range)
 
     def add(
-        self, held: ReflectivityMap, factors: np.ndarray, term: int, frequencies: np.ndarray, out: Sequence[Scratch],
-        budget: float, folder: Path | None,
+        self, held: ReflectivityMap, factors: np.ndarray, term: int, frequencies: np.ndarray,
+        out: Sequence[SpectrumRows], budget: float, folder: Path | None,
     ) -> None:  # fmt: skip
-        """Add the spectra of one term at frequencies, Hz (n_f,), to out, (n_u, n_f) for each polarisation.
+        """Add the spectra of one term at frequencies, Hz (n_f,), to rows of each polarisation.
 
         factors  of the part's scatterers in this term, complex64 (n, n_polarizations)
         budget   bytes;  folder  of temporary files: the map's transform is written to one where it takes over a sixth
         """
-        n_u, room = self.grid.count, budget / 6
-        for tables, share in zip(self.transfer.tables[term], self.shares(), strict=True):
+        room = budget / 6
+        for node, (tables, share) in enumerate(zip(self.transfer.tables[term], self.shares(), strict=True)):
             share = share.astype(np.complex64 if np.iscomplexobj(share) else np.float32)
-            for n, spectra in enumerate(out):
-                bands = held.over_azimuth(factors[self.picked, n] * share, budget)
+            for spectra in out:
+                begin, n_u = spectra.first, spectra.stop - spectra.first
+                amplitudes = factors[self.picked, spectra.polarization] * share
+                bands = held.over_azimuth(amplitudes, slice(begin, spectra.stop), budget)
                 whole, size = None, 0
                 for rows, made in bands:
                     if whole is None:  # bands one after the other, each with all wavenumbers
@@ -71,12 +114,13 @@ class MapPart:
                         made = np.pad(made, ((0, 0), (0, size - made.shape[1])))
                     whole.put(rows.start // size * n_u, made)
                 assert whole is not None
-                at_once = max(1, int(room / (8 * (self.map.n_rows + size + len(frequencies)))))
+                at_once = whole_vectors(room / (8 * (self.map.n_rows + size + len(frequencies))))
                 for first in range(0, n_u, at_once):
                     stop = min(first + at_once, n_u)
                     starts = range(0, whole.shape[0], n_u)
                     parts = [whole.rows(start + first, start + stop) for start in starts]
                     over = np.concatenate(parts, axis=1)[:, : self.map.n_rows] if len(parts) > 1 else parts[0]
-                    sums = spectra.rows(first, stop)
-                    held.add(over, slice(first, stop), tables, self.transfer, frequencies, sums, budget)
-                    spectra.put(first, sums)
+                    at = slice(begin + first, begin + stop)
+                    sums = spectra.zeros(at) if term == node == 0 else spectra.sums(at)
+                    held.add(over, at, tables, self.transfer, frequencies, sums, budget)
+                    spectra.put(at, sums)

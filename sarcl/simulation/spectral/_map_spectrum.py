@@ -28,6 +28,7 @@ from ._azimuth_transfer import AzimuthTransfer
 from ._map_plan import MapPlan, RangeWavenumbers
 
 AT_ONCE = 2**17  # pairs of wavenumber and frequency per block: their coordinates stay in a cache
+TOGETHER = 16  # rows: numbers that the host's vectors hold divide it
 PAIR = 80  # bytes per pair, of its coordinates and spectra
 FLAT = 9  # coefficients of 1/transform of the interpolation kernel
 
@@ -67,8 +68,11 @@ class ReflectivityMap:
         self.table = device.upload(plan.kernel.table)
         self.flat = device.upload(_flat(plan.kernel))
 
-    def over_azimuth(self, amplitudes: np.ndarray, budget: float) -> Iterator[tuple[slice, np.ndarray]]:
-        """Transform over azimuth of amplitudes (n,), band of rows by band: the rows, and complex64 (n_u, n rows).
+    def over_azimuth(
+        self, amplitudes: np.ndarray, wavenumbers: slice, budget: float
+    ) -> Iterator[tuple[slice, np.ndarray]]:
+        """Transform over azimuth of amplitudes (n,), band of rows by band: the rows, and complex64 (n_u, n rows) at
+        some wavenumbers.
 
         budget  bytes, of which a band and its transform take up to a fourth
         """
@@ -83,7 +87,7 @@ class ReflectivityMap:
                 f"{size_text(a_band)}; raise max_bytes to {6.1 * a_band:.2g} or more"
             )
         at_once = max(1, int(min(budget / 16, device.info.max_alloc) / a_band))
-        index = grid.indices - int(np.rint(self.numbers.u_c * grid.period / (2 * np.pi)))
+        index = grid.indices[wavenumbers] - int(np.rint(self.numbers.u_c * grid.period / (2 * np.pi)))
         flat = (1 / plan.kernel.transform(index / plan.n_columns)).astype(np.float32)
         row = (np.arange(plan.n_rows) - plan.origin) / plan.n_range
         flat_rows = (1 / plan.kernel.transform(row)).astype(np.float32)
@@ -134,6 +138,11 @@ class ReflectivityMap:
             )  # fmt: skip
             out[part] += device.download(buffer, made)
 
+    def _at_once(self, n_frequencies: int, budget: float) -> int:
+        """Wavenumbers per block, which takes up to a sixth of `budget` bytes."""
+        a_wavenumber = 16 * self.plan.n_range + PAIR * n_frequencies
+        return whole_vectors(min(AT_ONCE // n_frequencies, budget / 6 / a_wavenumber))
+
     def coordinates(
         self, transfer: AzimuthTransfer, frequencies: np.ndarray, wavenumbers: slice, budget: float
     ) -> Iterator[tuple[slice, tuple[Any, ...]]]:
@@ -142,9 +151,7 @@ class ReflectivityMap:
         budget  bytes, of which a block takes up to a sixth
         """
         plan, u, k = self.plan, self.grid.wavenumbers[wavenumbers], wavenumber(frequencies)
-        a_wavenumber = 16 * plan.n_range + PAIR * len(k)
-        at_once = max(1, min(AT_ONCE // len(k), int(budget / 6 / a_wavenumber)))
-        scale = plan.spacing * plan.n_range / (2 * np.pi)
+        at_once, scale = self._at_once(len(k), budget), plan.spacing * plan.n_range / (2 * np.pi)
         for start in range(0, len(u), at_once):
             part = slice(start, min(start + at_once, len(u)))
             kappa, cycles = self.numbers.rest(u[part], k)
@@ -158,6 +165,15 @@ class ReflectivityMap:
                 first.astype(np.int32), kappa.astype(np.float32), cycles.astype(np.float32), cell,
                 cell_rest.astype(np.float32),
             )  # fmt: skip
+
+
+def whole_vectors(n_rows: float) -> int:
+    """About n_rows, at least 1: so many that blocks of rows begin where the host's vectors of rows do.
+
+    The host transforms several rows together, and the rest of them one by one: the same rows whatever the blocks are.
+    """
+    n = max(1, int(n_rows))
+    return n // TOGETHER * TOGETHER if n >= TOGETHER else 1 << (n.bit_length() - 1)
 
 
 def _flat(kernel: Interpolator) -> np.ndarray:

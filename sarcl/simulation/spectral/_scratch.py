@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import tempfile
+import threading
 from pathlib import Path
 
 import numpy as np
+
+from ...base.types import PathLike
 
 
 class Scratch:
     """complex64 (n, m), zeros at first: in memory where it takes up to `room` bytes, else in a file without a name.
 
     folder  of the file; None: that of temporary files. The file is read and written in parts, not mapped: pages of a
-    mapped file count as memory of the process.
+    mapped file count as memory of the process. Several threads may use other rows of it at the same time: it is a
+    blocks.bands.FlatArray.
     """
 
     def __init__(self, shape: tuple[int, int], room: float, folder: Path | None) -> None:
@@ -21,16 +25,25 @@ class Scratch:
         if self.whole is None:
             self.file = tempfile.TemporaryFile(dir=folder, buffering=0)
             self.file.truncate(nbytes)
+            self._lock = threading.Lock()  # a place in the file belongs to one thread until it is read or written
+
+    def __getitem__(self, rows: slice) -> np.ndarray:
+        return self.rows(rows.start, rows.stop)
+
+    def __setitem__(self, rows: slice | tuple[slice, slice], block: np.ndarray) -> None:
+        assert isinstance(rows, slice)
+        self.put(rows.start, block)
 
     def rows(self, first: int, stop: int) -> np.ndarray:
         """Rows first ... stop - 1: (stop - first, m)."""
         if self.whole is not None:
             return self.whole[first:stop]
         out = np.empty((stop - first, self.shape[1]), np.complex64)
-        self.file.seek(8 * first * self.shape[1])
         left = out.view(np.uint8).ravel().data
-        while len(left):
-            left = left[self.file.readinto(left) :]
+        with self._lock:
+            self.file.seek(8 * first * self.shape[1])
+            while len(left):
+                left = left[self.file.readinto(left) :]
         return out
 
     def put(self, first: int, rows: np.ndarray) -> None:
@@ -39,18 +52,25 @@ class Scratch:
             if rows.base is not self.whole:  # else they are these rows
                 self.whole[first : first + len(rows)] = rows
             return
-        self.file.seek(8 * first * self.shape[1])
         left = np.ascontiguousarray(rows, np.complex64).view(np.uint8).ravel().data
-        while len(left):
-            left = left[self.file.write(left) :]
+        with self._lock:
+            self.file.seek(8 * first * self.shape[1])
+            while len(left):
+                left = left[self.file.write(left) :]
 
-    def columns(self, first: int, stop: int, room: float) -> np.ndarray:
-        """Columns first ... stop - 1: (n, stop - first); room  bytes for the rows that are read for them."""
+    def columns(self, first: int, stop: int, room: float, rows: slice = slice(None)) -> np.ndarray:
+        """Columns first ... stop - 1 of some rows, default all; room  bytes for the rows that are read for them."""
         if self.whole is not None:
-            return self.whole[:, first:stop]
-        out = np.empty((self.shape[0], stop - first), np.complex64)
+            return self.whole[rows, first:stop]
+        begin, end, _ = rows.indices(self.shape[0])
+        out = np.empty((end - begin, stop - first), np.complex64)
         at_once = max(1, int(room / (8 * self.shape[1])))
-        for start in range(0, self.shape[0], at_once):
-            end = min(start + at_once, self.shape[0])
-            out[start:end] = self.rows(start, end)[:, first:stop]
+        for start in range(begin, end, at_once):
+            last = min(start + at_once, end)
+            out[start - begin : last - begin] = self.rows(start, last)[:, first:stop]
         return out
+
+
+def folder_of(out: PathLike | None) -> Path | None:
+    """The folder for temporary files of echoes that go to `out`: beside it; None: that of the system."""
+    return None if out is None else Path(out).parent

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from ...base.options import option, or_none
 from ...base.validation import choice, flag
+from ...blocks.block_options import BlockOptions
 from ...model.antenna_array import AntennaArray
 from ...model.trajectory import Trajectory
 from ...numerics import plan
@@ -19,7 +20,7 @@ SKIPS = ("zero reflectivity", "facing away", "range window")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class SpectralEchoOptions(SceneOptions):
+class SpectralEchoOptions(SceneOptions, BlockOptions):
     """Options of `spectral_echo`."""
 
     variant: Literal["exact", "saras"] = option(

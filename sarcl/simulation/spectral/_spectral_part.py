@@ -12,6 +12,7 @@ import numpy as np
 from ...base.errors import NotApplicable, ToleranceUnreachable
 from ...base.rows import spread_over
 from ...base.tolerances import askable, rounded_up
+from ...numerics import cost_model
 from ...opencl.device import Device
 from ...scattering.facets import FacetSet
 from ._aspect_expansion import AmplitudeSamples, AspectExpansion, expand, one_function
@@ -30,12 +31,11 @@ from ._azimuth_transfer import (
 )
 from ._edge_map import EdgePlaces, EdgeTask, edge_map, places_of_edges
 from ._facet_factors import FacetFactors
-from ._map_part import MapPart
+from ._map_part import MapPart, SpectrumRows
 from ._map_plan import plan_map, range_wavenumbers, scatterers_per_cell, tile_of
 from ._map_spectrum import ReflectivityMap
 from ._planning_time import PlanningTime
 from ._scatterer_amplitudes import ScattererAmplitudes
-from ._scratch import Scratch
 from ._stationary_phase import stationary_tables
 from ._straight_track import StraightTrack, tangent
 
@@ -93,10 +93,10 @@ class SpectralPart:
         return PartOnDevice([one.on_device(device) for one in self.maps], factors)
 
     def add(
-        self, held: PartOnDevice, frequencies: np.ndarray, out: Sequence[Sequence[Scratch]], budget: float,
+        self, held: PartOnDevice, frequencies: np.ndarray, out: Sequence[Sequence[SpectrumRows]], budget: float,
         folder: Path | None, on_progress: Callable[[float], None],
     ) -> None:  # fmt: skip
-        """Add the spectra of every map at frequencies, Hz (n_f,), to out: for each map and polarisation (n_u, n_f).
+        """Write the spectra at frequencies, Hz (n_f,), to out: rows of each map, of one or several polarisations.
 
         budget  bytes;  folder  of temporary files
         """
@@ -104,8 +104,16 @@ class SpectralPart:
         for j in range(len(expansion)):
             factors = held.factors(float(expansion.sines[j]), float(expansion.frequencies[j]))
             for one, on_device, spectra in zip(self.maps, held.maps, out, strict=True):
-                one.add(on_device, factors, j, frequencies, spectra, budget, folder)
+                if spectra:
+                    one.add(on_device, factors, j, frequencies, spectra, budget, folder)
             on_progress((j + 1) / len(expansion))
+
+    def repeated_seconds(self) -> float:
+        """About the seconds of work that every block of one map repeats: amplitudes, and the map itself."""
+        of_facets = isinstance(self.amplitudes.part, FacetSet)
+        amplitude = cost_model.SPECTRAL_FACET if of_facets else cost_model.SPECTRAL_POINT
+        of_maps = max(cost_model.SPECTRAL_SPREAD * len(one.azimuth) * one.nodes for one in self.maps)
+        return 1e-6 * len(self.expansion) * (amplitude * len(self.some) + of_maps)
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,13 +12,18 @@ from ...base.errors import confirm_tolerance, warned_once
 from ...base.forecast import Forecast
 from ...base.report import Report, root_sum_square
 from ...base.stage_timer import Clock
+from ...blocks.block_job import BlockJob
+from ...blocks.checkpoint import Checkpoint
+from ...blocks.fill_bands import BandFiller
 from ...model.phase_history import PhaseHistory
 from ..echo_check import measure_error, seconds_to_check
+from ..echo_files import EchoFiles
 from ..echo_output import EchoOutput, bytes_of
 from ..echo_request import EchoRequest
 from ..echo_sampling import row_fields
-from ..scene_echoes import UNKNOWN_SHADOWS, ChannelEchoes
-from ..spreading import Counts
+from ..scene_echoes import UNKNOWN_SHADOWS
+from ._scratch import Scratch, folder_of
+from ._spectral_blocks import SpectrumBands, SpectrumRecipe, spectrum_job
 from ._spectral_options import SpectralEchoOptions
 from ._spectral_samples import SpectralSamples
 from ._stationary_phase import chirp_ripple
@@ -32,13 +37,14 @@ QUICK_CHECK = 1.0  # s, for the exact sums of the check
 class SpectralEchoPlan:
     """Echoes to be computed by Fourier transforms: a Plan.
 
-    seconds  of planning, by stage;  planned  None until `forecast` or `run` plans the scene: its samples have a place
-             before that
+    seconds  of planning, by stage;  piece  (i, n) where only that piece of the spectra is computed
+    planned  None until `forecast` or `run` plans the scene: its samples have a place before that
     """
 
     options: SpectralEchoOptions
     task: SpectralTask
     seconds: dict[str, float]
+    piece: tuple[int, int] | None = None
     planned: PlannedParts | None = None
 
     @property
@@ -61,7 +67,7 @@ class SpectralEchoPlan:
         return Forecast(
             method="Fourier transforms",
             plan=details,
-            seconds=spent + planned.seconds(),
+            seconds=spent + planned.seconds() / self.options.speedup(self.task.devices),
             bytes=bytes_of(self.shape),
             predicted_error=root_sum_square(planned.error_terms),
             error_terms=planned.error_terms,
@@ -72,30 +78,57 @@ class SpectralEchoPlan:
         )
 
     def run(self) -> PhaseHistory:
-        """The echoes."""
-        task, options, clock = self.task, self.options, Clock(self.seconds)
-        request = replace(task.request, clock=clock)
-        with EchoOutput(self.shape, options.out, request.budget, task.window) as output:
-            planned = _timed(self.planned, request) if self.planned else plan_parts(task, request)
-            spectrum = self._spectrum(planned)
-            folder = None if options.out is None else Path(options.out).parent
-            reference_range = task.seen.antennas.reference_range
-            SpectralSamples(
-                request, planned.parts, task.line, reference_range, task.frequencies, spectrum, folder
-            ).compute(output)
-            if planned.direct is not None:
-                _add_directly(planned.direct, spectrum, output)
-            raw = output.finish(
-                frequency=task.frequencies[0],
-                frequency_step=task.step,
-                **row_fields(task.track, None, reference_range, request.polarizations),
-                waveform=task.seen.waveform,
-                array=options.array,
-                compressed=options.compressed,
-                report=self._report(planned, request, self._measured(planned, spectrum, output, request)),
-            )
-        confirm_tolerance(raw=raw, instead="use echo")
-        return raw
+        """The echoes; None for a piece while others are missing."""
+        with ExitStack() as stack:
+            raw = self._echoes(stack, Clock(self.seconds))
+        if raw is not None:
+            confirm_tolerance(raw=raw, instead="use echo")
+        return raw  # type: ignore[return-value]
+
+    def _echoes(self, stack: ExitStack, clock: Clock) -> PhaseHistory | None:
+        task, options = self.task, self.options
+        request, job = replace(task.request, clock=clock), spectrum_job(task, options, self.shape)
+        files = EchoFiles(stack, job, self._output, out=options.out, resume=options.resume, piece=self.piece)
+        if (finished := files.finished()) is not None:
+            return finished
+        planned = _timed(self.planned, request) if self.planned else plan_parts(task, request)
+        filler = self._filler(planned, job, files.checkpoint, clock)
+        clock.lap("map")
+        output = files.output(filler)
+        if output is None:
+            return None
+        assert isinstance(job.bands, SpectrumBands)
+        rows = job.bands.n_rows, self.shape[2]
+        spectra = Scratch(rows, request.budget / 6, folder_of(options.out))
+        n_kept, spectrum = filler.fill(spectra)[1], self._spectrum(planned)
+        SpectralSamples(planned, request, spectrum).compute(spectra, job.bands, output)
+        measured = self._measured(planned, spectrum, output, request)
+        report = self._report(planned, request, measured, filler.workers.names)
+        if n_kept:
+            words = {**report.plan, "from files": f"{n_kept} of {job.bands.n_bands} blocks of spectra"}
+            report = replace(report, plan=words)
+        return files.finish(
+            frequency=task.frequencies[0],
+            frequency_step=task.step,
+            **row_fields(task.track, None, task.seen.antennas.reference_range, request.polarizations),
+            waveform=task.seen.waveform,
+            array=options.array,
+            compressed=options.compressed,
+            report=report,
+        )
+
+    def _output(self) -> EchoOutput:
+        """Destination of the samples."""
+        return EchoOutput(self.shape, self.options.out, self.task.request.budget, self.task.window, resumes=True)
+
+    def _filler(self, planned: PlannedParts, job: BlockJob, checkpoint: Checkpoint | None, clock: Clock) -> BandFiller:
+        """What fills the spectra, by the devices of the task."""
+        task, options, bands = self.task, self.options, job.bands
+        assert isinstance(bands, SpectrumBands)
+        bands.divide(planned)
+        recipe = SpectrumRecipe(planned, bands, options)
+        workers = options.workers(job, recipe, task.devices, recipe.on(task.devices[0]))
+        return BandFiller(workers, job, checkpoint, clock, options.progress)
 
     def _spectrum(self, planned: PlannedParts) -> np.ndarray:
         """Spectrum of all samples: the pulse, after its matched filter if compressed, times the antennas' factor."""
@@ -118,7 +151,9 @@ class SpectralEchoPlan:
         request.clock.lap("check")
         return measured
 
-    def _report(self, planned: PlannedParts, request: EchoRequest, measured: float | None) -> Report:
+    def _report(
+        self, planned: PlannedParts, request: EchoRequest, measured: float | None, devices: list[str]
+    ) -> Report:
         prepared = planned.prepared
         shadows = prepared.shadow_words
         if self.options.variant == "saras" and "shadow edges" in shadows:
@@ -140,7 +175,7 @@ class SpectralEchoPlan:
             measured_error=measured,
             **prepared.counted(planned.counts()),
             seconds=request.clock.seconds,
-            device=request.device.info.name,
+            device=" + ".join(devices),
             seed=request.seed,
         )
 
@@ -151,15 +186,3 @@ def _timed(planned: PlannedParts, request: EchoRequest) -> PlannedParts:
     if direct is not None:
         direct = replace(direct, scene=replace(direct.scene, request=request))
     return replace(planned, prepared=replace(planned.prepared, request=request), direct=direct)
-
-
-def _add_directly(direct: ChannelEchoes, spectrum: np.ndarray, output: EchoOutput) -> None:
-    """Add echoes that change from pulse to pulse as `echo` does; spectrum  complex (n_f,), of all samples."""
-    counts, n, request = Counts(), len(output), direct.scene.request
-    pulses = max(1, int(request.budget / 8 / (8.0 * np.prod(output.shape[1:]))))
-    for start in range(0, n, pulses):
-        stop = min(start + pulses, n)
-        block = np.zeros((stop - start, *output.shape[1:]), np.complex64)
-        counts += direct.add(block, range(start, stop), counts.pairs, len(direct.scene) * n)
-        output.add(start, block * spectrum.astype(np.complex64))
-    request.clock.lap("facets with shadows")

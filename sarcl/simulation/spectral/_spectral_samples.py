@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 
@@ -13,54 +12,41 @@ from ..echo_output import EchoOutput
 from ..echo_request import EchoRequest
 from ._map_part import MapPart
 from ._scratch import Scratch
-from ._spectral_part import SpectralPart
-from ._straight_track import StraightTrack
+from ._spectral_blocks import SpectrumBands
+from .spectral_parts import PlannedParts
 
 
 class SpectralSamples:
-    """Samples of all parts, block of frequencies by block."""
+    """Samples from the spectra of all parts, block of frequencies by block."""
 
-    def __init__(
-        self, request: EchoRequest, parts: Sequence[SpectralPart], line: StraightTrack,
-        reference_range: np.ndarray, frequencies: np.ndarray, spectrum: np.ndarray, folder: Path | None,
-    ) -> None:  # fmt: skip
-        """spectrum  complex (n_f,), by which all samples are multiplied;  folder  of temporary files, or None"""
-        self.device, self.request, self.parts, self.line = request.device, request, parts, line
-        self.reference_range, self.frequencies, self.spectrum = reference_range, frequencies, spectrum
-        self.folder = folder
+    def __init__(self, planned: PlannedParts, request: EchoRequest, spectrum: np.ndarray) -> None:
+        """request  with the clock of this run;  spectrum  complex (n_f,), by which all samples are multiplied"""
+        task = planned.task
+        self.planned, self.request, self.spectrum = planned, request, spectrum
+        self.device, self.line, self.frequencies = request.device, task.line, task.frequencies
+        self.reference_range = task.seen.antennas.reference_range
 
-    def compute(self, output: EchoOutput) -> None:
-        """Write the samples of all pulses to an output."""
+    def compute(self, spectra: Scratch, bands: SpectrumBands, output: EchoOutput) -> None:
+        """Write the samples of all pulses to an output; spectra  rows of `bands`."""
         request, n_polarizations = self.request, len(self.request.polarizations)
-        device_parts = [part.on_device(request.device, request.budget) for part in self.parts]
-        request.clock.lap("map")
-        maps = [one for part in self.parts for one in part.maps]
-        room = request.budget / 6 / (max(len(maps), 1) * n_polarizations)
-        spectra = [
-            [
-                [Scratch((one.grid.count, len(self.frequencies)), room, self.folder) for _ in range(n_polarizations)]
-                for one in part.maps
-            ]
-            for part in self.parts
-        ]
-        for i, (part, on_device, out) in enumerate(zip(self.parts, device_parts, spectra, strict=True)):
-
-            def on_progress(done: float, step: int = i) -> None:
-                request.report("echo", round(900 * (step + done) / len(device_parts)), 1000)
-
-            part.add(on_device, self.frequencies, out, request.budget, self.folder, on_progress)
-        whole = [made for out in spectra for made in out]
+        maps = [one for part in self.planned.parts for one in part.maps]
         n_frequencies, at_once = len(self.frequencies), self._at_once(maps, n_polarizations)
         for start in range(0, n_frequencies, at_once):
             some = slice(start, min(start + at_once, n_frequencies))
             block = np.zeros((self.line.n_pulses, n_polarizations, some.stop - start), np.complex64)
-            for one, made in zip(maps, whole, strict=True):
-                for n in range(n_polarizations):
-                    columns = made[n].columns(start, some.stop, request.budget / 16)
-                    block[:, n] += self._along_track(one, columns, self.frequencies[some])
-            block *= self._reference(some)[:, None]
+            for section in bands.sections:
+                rows = slice(section.first, section.first + section.n_rows)
+                columns = spectra.columns(start, some.stop, request.budget / 16, rows)
+                if section.part is None:  # the last section: these echoes have their phases already
+                    block *= self._reference(some)[:, None]
+                    block += columns.reshape(block.shape) * self.spectrum[some].astype(np.complex64)
+                else:
+                    one = self.planned.parts[section.part].maps[section.map]
+                    block[:, section.polarization] += self._along_track(one, columns, self.frequencies[some])
+            if self.planned.direct is None:
+                block *= self._reference(some)[:, None]
             output.keep_frequencies(start, block)
-            request.report("echo", 900 + round(100 * some.stop / n_frequencies), 1000)
+            request.report("echo", some.stop, n_frequencies)
         request.clock.lap("echo")
 
     def _at_once(self, maps: Sequence[MapPart], n_polarizations: int) -> int:

@@ -9,6 +9,7 @@ from ...model.phase_history import PhaseHistory
 from ...model.trajectory import Trajectory
 from ...model.waveform import Waveform
 from ...scene.scene import Scene
+from ..echo_task import check_subjects
 from ._spectral_options import SpectralEchoOptions
 from ._spectral_plan import SpectralEchoPlan
 from .spectral_task import spectral_task
@@ -32,12 +33,14 @@ def spectral_echo(
 
     Raises NotApplicable, a ValueError, for tracks, receivers, arrays and windows that it cannot take,
     ToleranceUnreachable, a ValueError, for tolerances: both name `echo`. ToleranceMissed, ValueError, MemoryError and
-    sarcl.NoDeviceError as `echo` does.
+    sarcl.NoDeviceError as `echo` does. With `tile`, returns None until the piece that completes the echoes.
     Source: docs/theory/spectral_echo.md; after Franceschetti, Migliaccio, Riccio and Schirinzi 1992 (SARAS).
     """
     clock = Clock()
     if options.ripple and isinstance(waveform, Waveform) and waveform.sweep_rate is None:
         raise ValueError(f"ripple is that of a rectangular chirp's spectrum, and the waveform is a {waveform.kind}")
-    task = spectral_task(scene, waveform, track, options, options.variant)
+    check_subjects(scene, waveform, track)
+    task = spectral_task(scene, waveform, track, options, options.devices(), options.variant)
+    piece = options.piece(options.out is not None, "raw.h5")
     clock.lap("plan")
-    return SpectralEchoPlan(options, task, clock.seconds)
+    return SpectralEchoPlan(options, task, clock.seconds, piece)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -10,12 +10,14 @@ import numpy as np
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.errors import NotApplicable
 from ...base.report import SMALLER_TOLERANCE, ErrorTerm
+from ...base.stage_timer import Clock
 from ...numerics import cost_model
+from ...opencl.device import Device
 from ...scattering.facets import FacetSet
 from ...scattering.scatterers import Points
 from ..echo_request import EchoRequest
 from ..scene_echoes import ChannelEchoes, SceneEchoes
-from ..scene_plan import planned_scene, share_of
+from ..scene_plan import ScenePlan, planned_scene, share_of
 from ..scene_preparation import prepare_scene
 from ..spreading import Counts
 from ._planning_time import PlanningTime
@@ -31,11 +33,13 @@ WINDOW_PULSES = 33  # pulses at which scatterers are compared with a range windo
 class PlannedParts:
     """The prepared scene, plans for its points and its facets, and the terms of the error of their sum.
 
+    scene   how the scene was prepared;  prepared  None in another process
     direct  echoes of facets of which pulses see different parts, as `echo` adds them; None where there are none, and
             for the variant "saras", whose shares of them change as slowly as amplitudes
     """
 
     task: SpectralTask
+    scene: ScenePlan
     prepared: SceneEchoes
     parts: list[SpectralPart]
     direct: ChannelEchoes | None
@@ -54,14 +58,29 @@ class PlannedParts:
         seen = sum(len(part.some) for part in self.parts) + n_direct
         return Counts(len(self.prepared) * n_pulses, 0, 0, (len(self.prepared) - seen) * n_pulses)
 
+    def direct_on(self, device: Device) -> ChannelEchoes | None:
+        """`direct` on another device, which prepares the scene too."""
+        seen, request = self.task.seen, replace(self.task.request, device=device, progress=None, clock=Clock())
+        prepared = prepare_scene(replace(self.scene, request=request), tiled=False)
+        direct = prepared.by_light(seen.antennas, seen.waveform)[1]
+        return None if direct is None else direct.channel(seen.antennas, seen.waveform, self.task.frequencies)
+
+    def portable(self) -> PlannedParts:
+        """The same for another process: what lies on a device is made there."""
+        return replace(self, direct=None, prepared=None)  # type: ignore[arg-type]
+
+    def seconds_pulse_by_pulse(self) -> float:
+        """About the seconds of the facets that are added as `echo` does."""
+        if self.direct is None:
+            return 0.0
+        partly = self.direct.scene.shadow_words.get("partly lit facets", 0)
+        each = cost_model.LIT_PART * partly + cost_model.ECHO_FACET * len(self.direct.scene)
+        return 1e-6 * each * len(self.task.track)
+
     def seconds(self) -> float:
         """About the seconds of the echoes, planning not included."""
-        task, total = self.task, 0.0
-        n_pulses, n_samples = len(task.track), len(task.frequencies)
-        if self.direct is not None:
-            partly = self.direct.scene.shadow_words.get("partly lit facets", 0)
-            each = cost_model.LIT_PART * partly + cost_model.ECHO_FACET * len(self.direct.scene)
-            total += 1e-6 * each * n_pulses
+        task, total = self.task, self.seconds_pulse_by_pulse()
+        n_samples = len(task.frequencies)
         for part in self.parts:
             n, terms = len(part.some), len(part.expansion)
             of_facets = isinstance(part.amplitudes.part, FacetSet)
@@ -81,7 +100,8 @@ def plan_parts(task: SpectralTask, request: EchoRequest, longest: float | None =
     """
     seen, exact = task.seen, task.variant == "exact"
     request.report("scene", 0, 3)
-    prepared = prepare_scene(planned_scene(request, seen, ()), tiled=False, exact=exact)
+    scene = planned_scene(request, seen, ())
+    prepared = prepare_scene(scene, tiled=False, exact=exact)
     steady, direct = next(iter(prepared.facets), None), None
     if exact:
         steady, direct = prepared.by_light(seen.antennas, seen.waveform)
@@ -99,7 +119,7 @@ def plan_parts(task: SpectralTask, request: EchoRequest, longest: float | None =
         channel = direct.channel(seen.antennas, seen.waveform, task.frequencies)
         terms.append(ErrorTerm("facets added pulse by pulse", channel.predicted_error, SMALLER_TOLERANCE))
     request.clock.lap("plan")
-    return PlannedParts(task, prepared, parts, channel, tuple(terms))
+    return PlannedParts(task, scene, prepared, parts, channel, tuple(terms))
 
 
 def _planned_part(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -11,11 +12,11 @@ from ...base.errors import NotApplicable
 from ...model.trajectory import Trajectory
 from ...model.waveform import Waveform
 from ...numerics.pulse_geometry import PulseGeometry
+from ...opencl.device import Device
 from ...scattering import antenna_weights
 from ...scene.scene import Scene
 from .. import echo_sampling
 from ..echo_request import EchoRequest
-from ..echo_task import check_subjects
 from ..scene_options import SceneOptions
 from ..scene_plan import SeenScene
 from ._straight_track import StraightTrack, straight_track
@@ -29,7 +30,7 @@ class SpectralTask:
 
     variant       "exact" or "saras";  seen  the scene as the antennas see it
     frequencies   of the samples, Hz (n,), and their step;  window  (near, far), m about the reference
-    motion        entries of the report
+    motion        entries of the report;  devices  of this process, that share the work
     """
 
     options: SceneOptions
@@ -42,14 +43,24 @@ class SpectralTask:
     step: float
     window: tuple[float, float]
     motion: dict[str, object]
+    devices: tuple[Device, ...] = ()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """For another process: without what belongs to this one."""
+        return {**self.__dict__, "options": self.options.portable(), "devices": ()}
 
 
 def spectral_task(
-    scene: Scene, waveform: Waveform, track: Trajectory, options: SceneOptions, variant: str = "exact"
+    scene: Scene,
+    waveform: Waveform,
+    track: Trajectory,
+    options: SceneOptions,
+    devices: tuple[Device, ...],
+    variant: str = "exact",
 ) -> SpectralTask:
-    """The task of these arguments. NotApplicable, which names `echo`, for what spectral_echo cannot take."""
-    check_subjects(scene, waveform, track)
-    request = EchoRequest.of(options, scene)
+    """The task of these arguments, planned on the first of the devices. NotApplicable, which names `echo`, for what
+    spectral_echo cannot take."""
+    request = EchoRequest.of(options, scene, devices[0])
     if options.receiver is not None:
         raise NotApplicable("spectral_echo is for one antenna that transmits and receives; use echo for a receiver")
     if options.array is not None and not is_single(options.array):
@@ -82,4 +93,5 @@ def spectral_task(
         step=step,
         window=(near, far),
         motion=motion,
+        devices=devices,
     )
