@@ -10,7 +10,7 @@ from helpers.cases import planned_within
 from helpers.lit_cases import lit_polygon
 
 import sarcl
-from sarcl.scattering import scatterers
+from sarcl.scattering import facet_shadows
 from sarcl.scene.triangles import areas, of_grid
 from sarcl.visibility.swept_shadows import never_shaded
 
@@ -114,13 +114,13 @@ def test_echoes_are_those_of_looks_at_all_pieces(bistatic, monkeypatch):
         return planned_within({"few_looks": 0}, sarcl.echo, scene, chirp, track, **options).run()
 
     sorted_out, number = echo(), []
-    real = scatterers.never_shaded
+    real = facet_shadows.never_shaded
 
     def nothing(*args):
         number.append(int(real(*args).sum()))
         return np.zeros(len(args[0]), bool)
 
-    monkeypatch.setattr(scatterers, "never_shaded", nothing)
+    monkeypatch.setattr(facet_shadows, "never_shaded", nothing)
     all_looked_at = echo()
     assert number[0] > 100
     assert sorted_out.report.contributions_skipped == all_looked_at.report.contributions_skipped
