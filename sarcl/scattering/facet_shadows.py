@@ -17,7 +17,7 @@ from ..scene.scene import Scene
 from ..scene.terrain import Heights, clear_of, facets_on
 from ..visibility.illumination import Illumination, lit
 from ..visibility.lit_parts import ON_PLANE, FacetPieces, LitParts
-from ..visibility.swept_shadows import never_shaded
+from ..visibility.swept_shadows import far_slopes, never_shaded
 from .facet_kinds import coherent
 from .facet_plan import FACET_BYTES
 from .random_surface import Pieces, with_facets
@@ -30,6 +30,8 @@ SMALL, MANY_SMALL, FEW_SMALL = 10.0, 100, 0.01
 # Of a facet of median width, by which shadows move between pulses that they are looked at from: largest, and over the
 # accuracy of amplitudes
 FINEST = 0.25, 3.0
+# Part of a terrain that antennas may see from below: with more, hardly any facet lies above all that may shade it
+MOST_FAR = 0.01
 
 
 @dataclass(frozen=True)
@@ -132,6 +134,7 @@ class Casters:
     solid  facets that stand on a terrain, or all where there is none, m (n, 3, 3);  floor  the terrain's, m (m, 3, 3)
     hidden_by_floor  facets of the scene that its terrain may hide from an antenna (k,) bool
     heights, on_heights  the terrain, None where there is none, and the facets that lie on it (k,) bool
+    far_slopes  facets of the terrain by which it may hide itself, m (n, 3, 3)
     """
 
     solid: np.ndarray
@@ -139,6 +142,7 @@ class Casters:
     hidden_by_floor: np.ndarray
     heights: Heights | None
     on_heights: np.ndarray
+    far_slopes: np.ndarray
 
     @classmethod
     def of(cls, scene: Scene, antennas: PulseGeometry) -> Casters:
@@ -146,9 +150,12 @@ class Casters:
         on = None if scene.heights is None else facets_on(scene.heights, scene.triangles)
         if scene.heights is None or on is None:
             nowhere = np.zeros(len(scene.triangles), bool)
-            return cls(scene.triangles, scene.triangles[:0], nowhere, None, nowhere)
+            return cls(scene.triangles, scene.triangles[:0], nowhere, None, nowhere, scene.triangles[:0])
         clear = clear_of(scene.heights, scene.triangles, on, antennas.ends)
-        return cls(scene.triangles[~on], scene.triangles[on], ~clear, scene.heights, on)
+        floor, casting = scene.triangles[on], scene.triangles[:0]
+        if not clear[on].all():
+            casting = floor[far_slopes(floor, antennas.ends)]
+        return cls(scene.triangles[~on], floor, ~clear, scene.heights, on, casting)
 
     @property
     def hides_any(self) -> bool:
@@ -193,9 +200,12 @@ class Casters:
     ) -> tuple[np.ndarray, float]:
         """Parts of a scene's facets `of` (k,), m (k, 3, 3), of which some antenna may not see the whole (k,) bool; and
         the power of the others, which lie on the terrain."""
-        is_lit = (self.on_heights & ~self.hidden_by_floor)[of]
-        rows = np.flatnonzero(is_lit)
-        is_lit[rows] = never_shaded(facets[rows], scene.two_sided[of[rows]], self.solid, antennas.ends)
+        is_lit, casters = np.zeros(len(of), bool), np.concatenate([self.solid, self.far_slopes])
+        if len(self.far_slopes) <= MOST_FAR * len(self.floor):
+            rows = np.flatnonzero(self.on_heights[of])
+            # of a terrain that may hide itself, the back of no facet is certain to be seen
+            two_sided = (scene.two_sided & ~self.hidden_by_floor)[of[rows]]
+            is_lit[rows] = never_shaded(facets[rows], two_sided, casters, antennas.ends)
         power = scene.reflectivity[of[is_lit]] ** 2 * geometry.areas(facets[is_lit])
         return ~is_lit, float(power.sum())
 
