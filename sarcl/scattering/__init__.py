@@ -6,6 +6,7 @@ For other folders:
     antenna_weights        antenna gains, spreading loss and the radar's factor per scatterer
     facet_kinds            which facets are mirrors, which are random, and which are alike
     facet_plan             subdivision and frequency nodes of facets for a tolerance
+    facet_shadows          what casts shadows in a scene, and what antennas see of pieces of facets
     facets                 facets ready for the kernel: subdivided, displaced, culled, illuminated
     kept_amplitudes        error of amplitudes that are interpolated between antenna positions, with phases
     physical_optics        phase integral, Fresnel coefficients and scattering matrix of a planar facet

@@ -11,29 +11,19 @@ import numpy as np
 from ..base import boxes
 from ..base.constants import EDGE_ON
 from ..base.errors import warn
-from ..base.text import size_text
 from ..numerics.pulse_geometry import PulseGeometry
 from ..opencl.device import Device
 from ..scene import triangles as geometry
 from ..scene.scene import Scene
-from ..scene.terrain import Heights, above, check_above, clear_of, facets_on
-from ..visibility.illumination import ALL_DARK, Illumination, lit
-from ..visibility.lit_parts import ON_PLANE, FacetPieces, LitParts
-from ..visibility.swept_shadows import never_shaded
+from ..scene.terrain import above, check_above, facets_on
+from ..visibility.illumination import ALL_DARK, Illumination
+from ..visibility.lit_parts import LitParts
 from .facet_kinds import coherent
-from .facet_plan import FACET_BYTES
+from .facet_shadows import ShadowRule, illumination_of, lit_parts_of, warn_of_reach
 from .facets import FacetSet
-from .random_surface import Pieces, with_facets
+from .random_surface import Pieces
 from .rough_pieces import RoughFacets, RoughPieces
 from .subdivision import CutScene
-
-Progress = Callable[[int, int], object]  # called as progress(pulse, pulses)
-# Facets count as small where their sides are less than so many times the distance below which corners lie in a plane;
-# so many of them, or such a share of all, are worth a warning
-SMALL, MANY_SMALL, FEW_SMALL = 10.0, 100, 0.01
-# Of a facet of median width, by which shadows move between pulses that they are looked at from: largest, and over the
-# accuracy of amplitudes
-FINEST = 0.25, 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,32 +56,6 @@ def points_of(scene: Scene, skips: set[str], n_pulses: int) -> tuple[Points | No
     return Points(scene.positions[keep], scene.amplitudes[keep]) if keep.any() else None, left_out
 
 
-@dataclass(frozen=True)
-class ShadowRule:
-    """Rule by which shadows on facets are computed.
-
-    exact    lit parts of coherent facets are computed; False: all shadows are shares, from samples
-    sampled, accuracy  shadows on incoherent facets are shares; with this error relative to the norm of these facets
-    margin   m: antennas of channels stand up to this far from these;  max_bytes  for lit parts, and for shares
-    host     bytes for pieces on the host
-    """
-
-    exact: bool
-    sampled: bool
-    accuracy: float
-    max_bytes: float
-    margin: float = 0.0
-    host: float = np.inf
-
-    def check_room(self, n: int) -> None:
-        """MemoryError for more pieces on which shadows may fall than the host holds."""
-        if n * FACET_BYTES > self.host:
-            raise MemoryError(
-                f"shadows may fall on {n:,} pieces of rough facets, which take {size_text(n * FACET_BYTES)}; max_bytes "
-                f"allows {size_text(self.host)}. Take a smaller scene, a larger max_bytes, or shadows=False"
-            )
-
-
 def facets_of(
     cut: CutScene,
     antennas: PulseGeometry,
@@ -118,11 +82,12 @@ def facets_of(
         host = _HostFacets.culled(cut.host, culling, shadows)
     progress("scene", 2, 3)
     if shadows is not None:
-        _warn_of_reach(original.triangles)
+        warn_of_reach(original.triangles)
         report_shadows = partial(progress, "shadows")
-        illumination = _illumination_of(original, rough, host, antennas, shadows, device, report_shadows)
+        sampled = None if host is None else (host.pieces, host.is_sampled)
+        illumination = illumination_of(original, rough, sampled, antennas, shadows, device, report_shadows)
         if host is not None and host.is_clipped.any():
-            lit_parts = _lit_parts_of(host.pieces, host.is_clipped, antennas, shadows, device, report_shadows)
+            lit_parts = lit_parts_of(host.pieces, host.is_clipped, antennas, shadows, device, report_shadows)
     sets: list[FacetSet] = [] if rough is None else list(_seen_rough(rough, illumination, culling))
     if host is not None:
         sets.append(host.seen(illumination, 0 if rough is None else len(rough), lit_parts, culling))
@@ -206,57 +171,6 @@ class _HostFacets:
         )
 
 
-def _lit_parts_of(
-    pieces: Pieces, wanted: np.ndarray, antennas: PulseGeometry, rule: ShadowRule, device: Device, progress: Progress
-) -> LitParts:
-    """Lit parts of the pieces `wanted` (k,), which the facets that they are parts of occlude."""
-    scene, given = pieces.scene, pieces.original.triangles
-    facets = FacetPieces(scene.triangles, scene.two_sided, wanted, given, pieces.of)
-    options = {"max_bytes": rule.max_bytes, "margin": rule.margin}
-    return LitParts(device, facets, given, antennas.ends, progress=progress, **options)
-
-
-def _illumination_of(
-    scene: Scene,
-    rough: RoughPieces | None,
-    host: _HostFacets | None,
-    antennas: PulseGeometry,
-    rule: ShadowRule,
-    device: Device,
-    progress: Progress,
-) -> Illumination | None:
-    """Shares, from samples, of the pieces of a scene on a device, and then of all of the host, of which those count
-    that are sampled; None: all of these are seen whole."""
-    rows = np.zeros(0, np.int64) if host is None else np.flatnonzero(host.is_sampled)
-    if rough is None and not len(rows):
-        return None
-    casters = Casters.of(scene, antennas)
-    if not casters.hides_any:
-        return None
-    n_rough, beside = 0 if rough is None else len(rough), 0.0
-    parts: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []  # corners, facets of the scene, numbers of pieces
-    if rough is not None:
-        is_shaded, power = casters.shade(scene, rough.facets, rough.of, antennas)
-        beside += power
-        if is_shaded.any():
-            rest = rough.rows(np.flatnonzero(is_shaded))
-            rule.check_room(len(rest))
-            corners, row = rest.corners()
-            number = np.flatnonzero(np.repeat(is_shaded, rough.counts))
-            parts.append((corners, rough.of[is_shaded][row], number))
-    if host is not None and len(rows):
-        pieces = host.pieces
-        is_shaded, power = casters.shade(scene, pieces.scene.triangles[rows], pieces.of[rows], antennas)
-        beside, rows = beside + power, rows[is_shaded]
-        parts.append((pieces.scene.triangles[rows], pieces.of[rows], n_rough + rows))
-    corners, of, number = (np.concatenate(values) for values in zip(*parts, strict=True)) if parts else [rows[:0]] * 3
-    if not len(number):
-        return None
-    cut = with_facets(scene, corners, of)
-    light = casters.light(cut, of, antennas, rule, device, progress, beside)
-    return light.among(number, n_rough + (0 if host is None else len(host.pieces)))
-
-
 class _Culling:
     """Pieces that are left out, and counts of their pairs with pulses: reason -> count."""
 
@@ -286,116 +200,12 @@ class _Culling:
         return keep
 
 
-def _warn_of_reach(triangles: np.ndarray) -> None:
-    """Warn where facets are so small beside all of the scene, m (k, 3, 3), that they count as lying in one plane."""
-    low, high = boxes.box(triangles.reshape(-1, 3))
-    apart = ON_PLANE * float(np.linalg.norm(high - low))
-    small = int((geometry.areas(triangles) < (SMALL * apart) ** 2).sum())
-    if small >= min(MANY_SMALL, FEW_SMALL * len(triangles)) and small:
-        warn(
-            f"the scene reaches over {float((high - low).max()):.3g} m: facets nearer to one another's planes than "
-            f"{apart:.2g} m do not shadow one another, and {small} are hardly larger than that; leave out what lies "
-            "far away, or compute its echoes on their own"
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class Casters:
-    """What casts shadows in a scene.
-
-    solid  facets that stand on a terrain, or all where there is none, m (n, 3, 3);  floor  the terrain's, m (m, 3, 3)
-    hidden_by_floor  facets of the scene that its terrain may hide from an antenna (k,) bool
-    heights, on_heights  the terrain, None where there is none, and the facets that lie on it (k,) bool
-    """
-
-    solid: np.ndarray
-    floor: np.ndarray
-    hidden_by_floor: np.ndarray
-    heights: Heights | None
-    on_heights: np.ndarray
-
-    @classmethod
-    def of(cls, scene: Scene, antennas: PulseGeometry) -> Casters:
-        """Those of a scene, its terrain by its facets where it is complete."""
-        on = None if scene.heights is None else facets_on(scene.heights, scene.triangles)
-        if scene.heights is None or on is None:
-            nowhere = np.zeros(len(scene.triangles), bool)
-            return cls(scene.triangles, scene.triangles[:0], nowhere, None, nowhere)
-        clear = clear_of(scene.heights, scene.triangles, on, antennas.ends)
-        return cls(scene.triangles[~on], scene.triangles[on], ~clear, scene.heights, on)
-
-    @property
-    def hides_any(self) -> bool:
-        """Whether any facet may be hidden: lines of sight steeper than all slopes of a terrain meet it once."""
-        return bool(len(self.solid) or self.hidden_by_floor.any())
-
-    def light(
-        self,
-        pieces: Scene,
-        of: np.ndarray,
-        antennas: PulseGeometry,
-        rule: ShadowRule,
-        device: Device,
-        progress: Progress,
-        beside: float,
-    ) -> Illumination:
-        """Shares of pieces of a scene's facets `of` (k,) that antennas see past these casters.
-
-        beside  power of other pieces, which all antennas see whole
-
-        The pieces are without random heights: displaced along their normals they would occlude their neighbours.
-        """
-        ground = (self.floor, self._pieces_hidden_by_floor(pieces, of, antennas)) if len(self.floor) else None
-        return lit(
-            pieces.triangles,
-            antennas.tx,
-            None if antennas.is_monostatic else antennas.rx,
-            two_sided=pieces.two_sided,
-            tolerance=min(FINEST[0], FINEST[1] * rule.accuracy),
-            accuracy=rule.accuracy,
-            weights=pieces.reflectivity**2 * geometry.areas(pieces.triangles),
-            beside=beside,
-            max_bytes=rule.max_bytes,
-            occluders=self.solid,
-            ground=ground,
-            device=device,
-            progress=progress,
-        )
-
-    def shade(
-        self, scene: Scene, facets: np.ndarray, of: np.ndarray, antennas: PulseGeometry
-    ) -> tuple[np.ndarray, float]:
-        """Parts of a scene's facets `of` (k,), m (k, 3, 3), of which some antenna may not see the whole (k,) bool; and
-        the power of the others, which lie on the terrain."""
-        is_lit = (self.on_heights & ~self.hidden_by_floor)[of]
-        rows = np.flatnonzero(is_lit)
-        is_lit[rows] = never_shaded(facets[rows], scene.two_sided[of[rows]], self.solid, antennas.ends)
-        power = scene.reflectivity[of[is_lit]] ** 2 * geometry.areas(facets[is_lit])
-        return ~is_lit, float(power.sum())
-
-    def _pieces_hidden_by_floor(self, pieces: Scene, of: np.ndarray, antennas: PulseGeometry) -> np.ndarray:
-        """Pieces of facets `of` (k,) that the terrain may hide (k,): of a wall, those near the ground alone."""
-        is_hidden = self.hidden_by_floor[of]
-        rows = np.flatnonzero(is_hidden)
-        if self.heights is not None and len(rows):
-            on = self.on_heights[of[rows]]
-            is_hidden[rows] = ~clear_of(self.heights, pieces.triangles[rows], on, antennas.ends)
-        return is_hidden
-
-
 def check_antennas_above(scene: Scene, antennas: PulseGeometry) -> None:
     """ValueError for an antenna under a scene's terrain, where that is complete."""
     for name, positions in zip(("track", "receiver"), antennas.ends, strict=False):
         if scene.heights is not None and above(scene.heights, positions).min() < 0:
             if facets_on(scene.heights, scene.triangles) is not None:
                 check_above(name, scene.heights, positions)
-
-
-def rough_looks(scene: Scene, cell: float, n_pulses: int) -> float:
-    """Pairs of a pulse and a piece of incoherent facets, cut to a cell's edge, m."""
-    rough = ~coherent(scene)
-    pieces = np.maximum(2 * geometry.areas(scene.triangles[rough]) / cell**2, 1.0)
-    return float(pieces.sum()) * n_pulses
 
 
 def faces_away(centers: np.ndarray, normals: np.ndarray, antennas: PulseGeometry) -> np.ndarray:

@@ -17,7 +17,7 @@ from ..scattering.antenna_weight_error import weight_error as error_of_weights
 from ..scattering.antenna_weights import AntennaWeights, WeightError
 from ..scattering.facet_kinds import FacetView
 from ..scattering.facet_plan import MOST_FACETS
-from ..scattering.scatterers import rough_looks
+from ..scattering.facet_shadows import rough_looks
 from ..scattering.subdivision import Subdivision, cell_edge, plan_cut
 from ..scene.scene import Scene
 from ._unseen_scene import refuse_unseen

@@ -9,10 +9,11 @@ from ..base.errors import NothingSeen, ToleranceUnreachable, warn
 from ..base.report import ErrorTerm
 from ..base.tolerances import askable, rounded_up
 from ..scattering.antenna_weights import AntennaWeights
+from ..scattering.facet_shadows import ShadowRule
 from ..scattering.facets import FacetSet
 from ..scattering.mesh_quality import facet_error, speckle_contrast
 from ..scattering.rough_pieces import PIECE_BYTES, RoughFacets
-from ..scattering.scatterers import Points, ShadowRule, facets_of, points_of
+from ..scattering.scatterers import Points, facets_of, points_of
 from ..scattering.subdivision import Subdivision
 from ..scene.scene import Scene
 from .echo_request import EchoRequest

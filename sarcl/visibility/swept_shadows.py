@@ -44,19 +44,38 @@ def never_shaded(
     return is_lit
 
 
+def far_slopes(terrain: np.ndarray, ends: list[np.ndarray]) -> np.ndarray:
+    """Facets of a complete terrain, m (k, 3, 3), that some antenna above it, m (n_pulses, 3) each, may see from below
+    (k,) bool.
+
+    A line of sight from a facet that faces an antenna runs over the terrain, and enters it through one of these alone.
+    """
+    upward = np.sign(normals(terrain)[:, 2:])
+    is_far = np.zeros(len(terrain), bool)
+    for end in ends:
+        is_far |= ~_face(terrain, upward * normals(terrain), box_about(end))
+    return is_far
+
+
+def _face(triangles: np.ndarray, normal: np.ndarray, eyes: np.ndarray) -> np.ndarray:
+    """Which triangles, m (k, 3, 3), turn a normal (k, 3) towards all of some places, m (n, 3)."""
+    return np.asarray((normal @ eyes.T).min(axis=1) > dot(normal, triangles[:, 0]))
+
+
 def _sees_whole(triangles: np.ndarray, two_sided: np.ndarray, occluders: np.ndarray, end: np.ndarray) -> np.ndarray:
-    bounds = box(np.concatenate([box(part.reshape(-1, 3)) for part in (triangles, occluders) if len(part)]))
-    drawn = triangles[:: len(triangles) // DRAWN + 1]
-    width = float(np.quantile(np.maximum.reduce(edges(drawn)), USUAL)) if len(drawn) else 0.0
-    swept = _SweptHeights.of(occluders, bounds, end, width)
-    is_lit, eyes = np.zeros(len(triangles), bool), box_about(end)
-    if swept is None:
-        return is_lit
+    is_lit, eyes, swept = np.zeros(len(triangles), bool), box_about(end), None
+    if len(occluders):
+        bounds = box(np.concatenate([box(part.reshape(-1, 3)) for part in (triangles, occluders) if len(part)]))
+        drawn = triangles[:: len(triangles) // DRAWN + 1]
+        width = float(np.quantile(np.maximum.reduce(edges(drawn)), USUAL)) if len(drawn) else 0.0
+        swept = _SweptHeights.of(occluders, bounds, end, width)
+        if swept is None:
+            return is_lit
     for first in range(0, len(triangles), BLOCK):  # so few stay in the processor's cache
         block = slice(first, first + BLOCK)
-        part, normal = triangles[block], normals(triangles[block])
-        faces = two_sided[block] | ((normal @ eyes.T).min(axis=1) > dot(normal, part[:, 0]))
-        is_lit[block] = faces & swept.lie_above(part)
+        part = triangles[block]
+        faces = two_sided[block] | _face(part, normals(part), eyes)
+        is_lit[block] = faces & swept.lie_above(part) if swept is not None else faces
     return is_lit
 
 

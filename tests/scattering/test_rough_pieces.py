@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 import sarcl
 from sarcl.reference import facet_pieces
-from sarcl.scattering import rough_pieces, scatterers
+from sarcl.scattering import facet_shadows, rough_pieces
 from sarcl.scattering.random_surface import ROUND, cell_edge, pieces_of
 from sarcl.scattering.rough_pieces import RoughFacets, RoughPieces
 from sarcl.scene import triangles as geometry
@@ -226,7 +226,7 @@ def test_more_pieces_in_shadow_than_the_host_holds_are_refused(double, monkeypat
     monkeypatch.setattr(echo_request, "LEAST_HOST", 1e6)
     plan = planned_within({"few_looks": 0}, sarcl.echo, SCENES["a box on terrain"][0](), CHIRP, track(), tolerance=2e-2,
                           device=double, max_bytes=1e6)  # fmt: skip
-    monkeypatch.setattr(scatterers, "FACET_BYTES", 1e5)
+    monkeypatch.setattr(facet_shadows, "FACET_BYTES", 1e5)
     with pytest.raises(MemoryError, match="shadows may fall on"):
         plan.run()
 

@@ -11,7 +11,7 @@ from scipy.ndimage import gaussian_filter
 
 import sarcl
 from sarcl import shapes
-from sarcl.scattering import scatterers
+from sarcl.scattering import facet_shadows
 from sarcl.scene.terrain import facets_on
 from sarcl.visibility import illumination
 
@@ -40,7 +40,7 @@ def sampled(monkeypatch):
         seen.append(options["ground"])
         return lit(*arguments, **options)
 
-    monkeypatch.setattr(scatterers, "lit", spy)
+    monkeypatch.setattr(facet_shadows, "lit", spy)
     return seen
 
 
@@ -87,7 +87,7 @@ def test_terrain_below_every_line_of_sight_hides_what_stands_under_it_alone(monk
     """Gentle hills are left out as occluders, but for a box that is half in the ground."""
     ground, asked = hills(height=0.3), []
     lit = illumination.lit
-    monkeypatch.setattr(scatterers, "lit", lambda *given, **options: asked.append(options) or lit(*given, **options))
+    monkeypatch.setattr(facet_shadows, "lit", lambda *given, **options: asked.append(options) or lit(*given, **options))
     scene = ground + shapes.box((4, 3, 3), material=LAMBERT).moved((5, 5, 0.2))
     known, unknown = (sampled_echo(one, WAVE, track(), **OPTIONS) for one in (scene, without(scene)))
     assert np.linalg.norm(known.samples - unknown.samples) <= 1e-2 * np.linalg.norm(unknown.samples)

@@ -10,9 +10,9 @@ from helpers.cases import planned_within
 from helpers.lit_cases import lit_polygon
 
 import sarcl
-from sarcl.scattering import scatterers
+from sarcl.scattering import facet_shadows
 from sarcl.scene.triangles import areas, of_grid
-from sarcl.visibility.swept_shadows import never_shaded
+from sarcl.visibility.swept_shadows import far_slopes, never_shaded
 
 ROUGH = sarcl.Material(diagram="cos")
 
@@ -23,6 +23,29 @@ def ground(n, half=10.0, seed=None):
         np.zeros((n + 1, n + 1)) if seed is None else np.random.default_rng(seed).uniform(-0.2, 0.2, (n + 1, n + 1))
     )
     return of_grid(np.stack([*np.meshgrid(axis, axis), heights], axis=-1))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_terrain_shades_itself_by_its_far_slopes_alone(seed):
+    """Hills with facets steeper than the lines of sight, against polygons of all facets at every pulse."""
+    facets = ground(16, half=2.0, seed=seed)
+    ends = [arc(start=start, elevation=0.75, width=0.2) for start in (0.0, 1.2)[: 1 + seed % 2]]
+    is_far = far_slopes(facets, ends)
+    assert 0 < is_far.sum() < 0.2 * len(facets)
+    is_lit = never_shaded(facets, np.zeros(len(facets), bool), facets[is_far], ends)
+    assert is_lit.any()
+    assert not is_lit[is_far].any()
+    for facet in facets[is_lit]:
+        assert least_share(facet, facets, ends) > 1 - 1e-6
+
+
+def test_far_slopes_do_not_depend_on_the_winding_and_gentle_terrains_have_none():
+    facets = ground(16, half=2.0, seed=1)
+    assert (far_slopes(facets, [arc()]) == far_slopes(facets[:, ::-1], [arc()])).all()
+    gentle = ground(16, half=60.0, seed=1)
+    assert not far_slopes(gentle, [arc(distance=1e4)]).any()
+    none = np.zeros(len(gentle), bool)
+    assert never_shaded(gentle, none, gentle[:0], [arc(distance=1e4)]).all()
 
 
 def box(size, at):
@@ -114,13 +137,13 @@ def test_echoes_are_those_of_looks_at_all_pieces(bistatic, monkeypatch):
         return planned_within({"few_looks": 0}, sarcl.echo, scene, chirp, track, **options).run()
 
     sorted_out, number = echo(), []
-    real = scatterers.never_shaded
+    real = facet_shadows.never_shaded
 
     def nothing(*args):
         number.append(int(real(*args).sum()))
         return np.zeros(len(args[0]), bool)
 
-    monkeypatch.setattr(scatterers, "never_shaded", nothing)
+    monkeypatch.setattr(facet_shadows, "never_shaded", nothing)
     all_looked_at = echo()
     assert number[0] > 100
     assert sorted_out.report.contributions_skipped == all_looked_at.report.contributions_skipped

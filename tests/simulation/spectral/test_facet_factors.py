@@ -10,9 +10,10 @@ import sarcl
 from sarcl import pointing
 from sarcl.numerics.pulse_geometry import PulseGeometry
 from sarcl.scattering.antenna_weights import weights_of
+from sarcl.scattering.facet_shadows import ShadowRule
 from sarcl.scattering.physical_optics import normals_and_areas
 from sarcl.scattering.random_surface import pieces_of
-from sarcl.scattering.scatterers import ShadowRule, facets_of
+from sarcl.scattering.scatterers import facets_of
 from sarcl.scattering.subdivision import CutScene
 from sarcl.simulation.spectral import _facet_factors as factors
 from sarcl.simulation.spectral._scatterer_amplitudes import ScattererAmplitudes

@@ -1,0 +1,226 @@
+"""Shadows on the facets of a scene: what casts them, and what antennas see of pieces of facets."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base import boxes
+from ..base.errors import warn
+from ..base.text import size_text
+from ..numerics.pulse_geometry import PulseGeometry
+from ..opencl.device import Device
+from ..scene import triangles as geometry
+from ..scene.scene import Scene
+from ..scene.terrain import Heights, clear_of, facets_on
+from ..visibility.illumination import Illumination, lit
+from ..visibility.lit_parts import ON_PLANE, FacetPieces, LitParts
+from ..visibility.swept_shadows import far_slopes, never_shaded
+from .facet_kinds import coherent
+from .facet_plan import FACET_BYTES
+from .random_surface import Pieces, with_facets
+from .rough_pieces import RoughPieces
+
+Progress = Callable[[int, int], object]  # called as progress(pulse, pulses)
+# Facets count as small where their sides are less than so many times the distance below which corners lie in a plane;
+# so many of them, or such a share of all, are worth a warning
+SMALL, MANY_SMALL, FEW_SMALL = 10.0, 100, 0.01
+# Of a facet of median width, by which shadows move between pulses that they are looked at from: largest, and over the
+# accuracy of amplitudes
+FINEST = 0.25, 3.0
+# Part of a terrain that antennas may see from below: with more, hardly any facet lies above all that may shade it
+MOST_FAR = 0.01
+
+
+@dataclass(frozen=True)
+class ShadowRule:
+    """Rule by which shadows on facets are computed.
+
+    exact    lit parts of coherent facets are computed; False: all shadows are shares, from samples
+    sampled, accuracy  shadows on incoherent facets are shares; with this error relative to the norm of these facets
+    margin   m: antennas of channels stand up to this far from these;  max_bytes  for lit parts, and for shares
+    host     bytes for pieces on the host
+    """
+
+    exact: bool
+    sampled: bool
+    accuracy: float
+    max_bytes: float
+    margin: float = 0.0
+    host: float = np.inf
+
+    def check_room(self, n: int) -> None:
+        """MemoryError for more pieces on which shadows may fall than the host holds."""
+        if n * FACET_BYTES > self.host:
+            raise MemoryError(
+                f"shadows may fall on {n:,} pieces of rough facets, which take {size_text(n * FACET_BYTES)}; max_bytes "
+                f"allows {size_text(self.host)}. Take a smaller scene, a larger max_bytes, or shadows=False"
+            )
+
+
+def lit_parts_of(
+    pieces: Pieces, wanted: np.ndarray, antennas: PulseGeometry, rule: ShadowRule, device: Device, progress: Progress
+) -> LitParts:
+    """Lit parts of the pieces `wanted` (k,), which the facets that they are parts of occlude."""
+    scene, given = pieces.scene, pieces.original.triangles
+    facets = FacetPieces(scene.triangles, scene.two_sided, wanted, given, pieces.of)
+    options = {"max_bytes": rule.max_bytes, "margin": rule.margin}
+    return LitParts(device, facets, given, antennas.ends, progress=progress, **options)
+
+
+def illumination_of(
+    scene: Scene,
+    rough: RoughPieces | None,
+    host: tuple[Pieces, np.ndarray] | None,
+    antennas: PulseGeometry,
+    rule: ShadowRule,
+    device: Device,
+    progress: Progress,
+) -> Illumination | None:
+    """Shares, from samples, of the pieces of a scene on a device, and then of all of the host; None: all of these are
+    seen whole.
+
+    host  those of the host, and which of them count (k,) bool
+    """
+    rows = np.zeros(0, np.int64) if host is None else np.flatnonzero(host[1])
+    if rough is None and not len(rows):
+        return None
+    casters = Casters.of(scene, antennas)
+    if not casters.hides_any:
+        return None
+    n_rough, beside = 0 if rough is None else len(rough), 0.0
+    parts: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []  # corners, facets of the scene, numbers of pieces
+    if rough is not None:
+        is_shaded, power = casters.shade(scene, rough.facets, rough.of, antennas)
+        beside += power
+        if is_shaded.any():
+            rest = rough.rows(np.flatnonzero(is_shaded))
+            rule.check_room(len(rest))
+            corners, row = rest.corners()
+            number = np.flatnonzero(np.repeat(is_shaded, rough.counts))
+            parts.append((corners, rough.of[is_shaded][row], number))
+    if host is not None and len(rows):
+        pieces = host[0]
+        is_shaded, power = casters.shade(scene, pieces.scene.triangles[rows], pieces.of[rows], antennas)
+        beside, rows = beside + power, rows[is_shaded]
+        parts.append((pieces.scene.triangles[rows], pieces.of[rows], n_rough + rows))
+    corners, of, number = (np.concatenate(values) for values in zip(*parts, strict=True)) if parts else [rows[:0]] * 3
+    if not len(number):
+        return None
+    cut = with_facets(scene, corners, of)
+    light = casters.light(cut, of, antennas, rule, device, progress, beside)
+    return light.among(number, n_rough + (0 if host is None else len(host[0])))
+
+
+def warn_of_reach(triangles: np.ndarray) -> None:
+    """Warn where facets are so small beside all of the scene, m (k, 3, 3), that they count as lying in one plane."""
+    low, high = boxes.box(triangles.reshape(-1, 3))
+    apart = ON_PLANE * float(np.linalg.norm(high - low))
+    small = int((geometry.areas(triangles) < (SMALL * apart) ** 2).sum())
+    if small >= min(MANY_SMALL, FEW_SMALL * len(triangles)) and small:
+        warn(
+            f"the scene reaches over {float((high - low).max()):.3g} m: facets nearer to one another's planes than "
+            f"{apart:.2g} m do not shadow one another, and {small} are hardly larger than that; leave out what lies "
+            "far away, or compute its echoes on their own"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Casters:
+    """What casts shadows in a scene.
+
+    solid  facets that stand on a terrain, or all where there is none, m (n, 3, 3);  floor  the terrain's, m (m, 3, 3)
+    hidden_by_floor  facets of the scene that its terrain may hide from an antenna (k,) bool
+    heights, on_heights  the terrain, None where there is none, and the facets that lie on it (k,) bool
+    far_slopes  facets of the terrain by which it may hide itself, m (n, 3, 3)
+    """
+
+    solid: np.ndarray
+    floor: np.ndarray
+    hidden_by_floor: np.ndarray
+    heights: Heights | None
+    on_heights: np.ndarray
+    far_slopes: np.ndarray
+
+    @classmethod
+    def of(cls, scene: Scene, antennas: PulseGeometry) -> Casters:
+        """Those of a scene, its terrain by its facets where it is complete."""
+        on = None if scene.heights is None else facets_on(scene.heights, scene.triangles)
+        if scene.heights is None or on is None:
+            nowhere = np.zeros(len(scene.triangles), bool)
+            return cls(scene.triangles, scene.triangles[:0], nowhere, None, nowhere, scene.triangles[:0])
+        clear = clear_of(scene.heights, scene.triangles, on, antennas.ends)
+        floor, casting = scene.triangles[on], scene.triangles[:0]
+        if not clear[on].all():
+            casting = floor[far_slopes(floor, antennas.ends)]
+        return cls(scene.triangles[~on], floor, ~clear, scene.heights, on, casting)
+
+    @property
+    def hides_any(self) -> bool:
+        """Whether any facet may be hidden: lines of sight steeper than all slopes of a terrain meet it once."""
+        return bool(len(self.solid) or self.hidden_by_floor.any())
+
+    def light(
+        self,
+        pieces: Scene,
+        of: np.ndarray,
+        antennas: PulseGeometry,
+        rule: ShadowRule,
+        device: Device,
+        progress: Progress,
+        beside: float,
+    ) -> Illumination:
+        """Shares of pieces of a scene's facets `of` (k,) that antennas see past these casters.
+
+        beside  power of other pieces, which all antennas see whole
+
+        The pieces are without random heights: displaced along their normals they would occlude their neighbours.
+        """
+        ground = (self.floor, self._pieces_hidden_by_floor(pieces, of, antennas)) if len(self.floor) else None
+        return lit(
+            pieces.triangles,
+            antennas.tx,
+            None if antennas.is_monostatic else antennas.rx,
+            two_sided=pieces.two_sided,
+            tolerance=min(FINEST[0], FINEST[1] * rule.accuracy),
+            accuracy=rule.accuracy,
+            weights=pieces.reflectivity**2 * geometry.areas(pieces.triangles),
+            beside=beside,
+            max_bytes=rule.max_bytes,
+            occluders=self.solid,
+            ground=ground,
+            device=device,
+            progress=progress,
+        )
+
+    def shade(
+        self, scene: Scene, facets: np.ndarray, of: np.ndarray, antennas: PulseGeometry
+    ) -> tuple[np.ndarray, float]:
+        """Parts of a scene's facets `of` (k,), m (k, 3, 3), of which some antenna may not see the whole (k,) bool; and
+        the power of the others, which lie on the terrain."""
+        is_lit, casters = np.zeros(len(of), bool), np.concatenate([self.solid, self.far_slopes])
+        if len(self.far_slopes) <= MOST_FAR * len(self.floor):
+            rows = np.flatnonzero(self.on_heights[of])
+            # of a terrain that may hide itself, the back of no facet is certain to be seen
+            two_sided = (scene.two_sided & ~self.hidden_by_floor)[of[rows]]
+            is_lit[rows] = never_shaded(facets[rows], two_sided, casters, antennas.ends)
+        power = scene.reflectivity[of[is_lit]] ** 2 * geometry.areas(facets[is_lit])
+        return ~is_lit, float(power.sum())
+
+    def _pieces_hidden_by_floor(self, pieces: Scene, of: np.ndarray, antennas: PulseGeometry) -> np.ndarray:
+        """Pieces of facets `of` (k,) that the terrain may hide (k,): of a wall, those near the ground alone."""
+        is_hidden = self.hidden_by_floor[of]
+        rows = np.flatnonzero(is_hidden)
+        if self.heights is not None and len(rows):
+            on = self.on_heights[of[rows]]
+            is_hidden[rows] = ~clear_of(self.heights, pieces.triangles[rows], on, antennas.ends)
+        return is_hidden
+
+
+def rough_looks(scene: Scene, cell: float, n_pulses: int) -> float:
+    """Pairs of a pulse and a piece of incoherent facets, cut to a cell's edge, m."""
+    rough = ~coherent(scene)
+    pieces = np.maximum(2 * geometry.areas(scene.triangles[rough]) / cell**2, 1.0)
+    return float(pieces.sum()) * n_pulses
