@@ -138,6 +138,13 @@ def test_the_plain_call_completes_what_pieces_began(whole, tmp_path):
     assert names(tmp_path) == ["a.h5"]
 
 
+def test_the_error_of_the_grid_is_compared_at_the_pulse_of_the_anchor_too():
+    # of 40 pulses 32 are compared, and pulse 17, which is not among these
+    options = {"track": around(*np.linspace(20, 30, 40)), "model_error": True, "tolerance": 0.3}
+    raw = echo(anchors=[17], **options)
+    assert raw.report.plan["anchors"] == [17] and 0 < raw.report.model_error < 1
+
+
 # ---- resuming
 
 
