@@ -4,6 +4,9 @@
 .DEFAULT_GOAL := help
 .PHONY: help demo test test-all fuzz tasks mutants gpu-static bench results architecture options lint clean ready ready-dev
 
+# Tests start hundreds of processes: each would compile the package again where bytecode is not kept.
+export PYTHONDONTWRITEBYTECODE :=
+
 ARGS ?=
 PYTEST = .venv/bin/python -m pytest --numprocesses auto --maxprocesses 4 --dist loadfile
 CODE = sarcl kernels tests bench docs conftest.py

@@ -10,23 +10,30 @@ import pytest
 from helpers.devices import ALONE, TWINS, opened, variants
 
 
+@pytest.hookimpl(tryfirst=True)  # before -m chooses
 def pytest_collection_modifyitems(config, items):
-    """Leave out tests on twins of devices.
+    """Leave out tests on twins of devices, or leave them to the slow tests.
 
     Repeated tests run on no twin: twins run every value of every parameter with its quick partners. Of the twins that
     only the slow tests have, each runs every fourth combination of a test's values; the two run different ones where
-    there are enough.
+    there are enough. The quick tests run every other combination on the remaining twin, and costly ones on none.
     """
-    left_out, combinations = set(), defaultdict(list)
+    left_out, combinations, quick = set(), defaultdict(list), defaultdict(list)
     for item in items:
         twin = _twin(item)
         if twin and item.get_closest_marker("repeated"):
             left_out.add(item)
         elif twin in ALONE:
             combinations[item.parent.nodeid, item.originalname, twin].append(item)
+        elif twin and not item.get_closest_marker("slow"):
+            quick[item.parent.nodeid, item.originalname].append(item)
     for (*_, twin), found in combinations.items():
         first = min(2 * ALONE.index(twin), len(found) - 1)
         left_out.update(item for at, item in enumerate(found) if (at - first) % 4)
+    for found in quick.values():
+        for at, item in enumerate(found):
+            if at % 2 or item.get_closest_marker("costly"):
+                item.add_marker(pytest.mark.slow)
     if left_out:
         config.hook.pytest_deselected(items=list(left_out))
         items[:] = [item for item in items if item not in left_out]

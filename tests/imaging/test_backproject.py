@@ -214,6 +214,7 @@ def test_weak_point_beside_a_strong_one_keeps_its_place(device):
     assert image_error(sarcl.backproject(tiny, PLANE, device=device), tiny) <= 1e-3
 
 
+@pytest.mark.costly
 def test_a_tile_far_larger_than_the_window_reads_nothing_beyond_a_profile(device):
     # pixels 2 km and 200 km apart: places in a tile exceed what float32 counts in samples
     for spacing, bandwidth in ((2e4, 5e9), (2e5, 6e8)):

@@ -152,6 +152,7 @@ def test_tolerances_below_complex64_name_the_method_that_meets_them():
         choose_method.choose(make_task(noise_on(straight(40)), GRID, None, None, False, True), "factorized", 1e-8)
 
 
+@pytest.mark.costly
 def test_profiles_of_kept_pulses_are_those_of_the_twin(device):
     from sarcl.base.constants import SPEED_OF_LIGHT
     from sarcl.base.stage_timer import Clock

@@ -43,6 +43,7 @@ SLOW = "several range blocks", "beam", "beam with a window", "track longer than 
 
 
 @pytest.mark.parametrize("case", [pytest.param(c, marks=[pytest.mark.slow] if c in SLOW else []) for c in CASES])
+@pytest.mark.costly
 def test_images_of_the_device_are_those_of_the_host_within_the_tolerance(device, case):
     track, options = CASES[case]
     raw = noise(**track)

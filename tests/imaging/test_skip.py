@@ -201,6 +201,7 @@ def looked_at(chosen, task):
 
 
 @pytest.mark.parametrize("listed", [False, pytest.param(True, marks=REPEATED)], ids=["plane", "points"])
+@pytest.mark.costly
 def test_sub_apertures_merge_rows_that_see_a_tile_whole_and_add_the_others_directly(device, listed):
     # a beam 130 m wide passes over the scene: every tile sees some pulses whole, some in part, some not at all
     raw, beam = strip_history(n=900, n_samples=256, length=260.0), (spread(10e3, 130.0), BROADSIDE)
@@ -321,6 +322,7 @@ def test_empty_cells_are_zero_counted_and_change_no_other_pixel(device, method):
         assert np.linalg.norm(only.data - image.data[~gone]) <= 1e-5 * np.linalg.norm(only.data)
 
 
+@pytest.mark.costly
 def test_empty_cells_that_are_not_skipped_are_zero_all_the_same(device):
     raw = noise_history(n_rows=15)
     positions, gone = holed(PLANE)

@@ -56,6 +56,7 @@ def test_fig_12_smooth_facets_on_a_rough_profile_do_not():
     assert rayleigh > 0.01 and uniform > 0.01 and contrast < 1.2
 
 
+@pytest.mark.slow
 def test_fig_12_without_statistics_nothing_is_random():
     once, again, rough = fig_12("d", seed=1), fig_12("d", seed=2), fig_12("b")
     assert np.array_equal(once, again)

@@ -67,6 +67,7 @@ def test_shared_amplitudes_keep_the_tolerance(device, always, material, toleranc
     assert raw.report.measured_error <= raw.report.predicted_error <= tolerance
 
 
+@pytest.mark.costly
 def test_shared_or_not_the_same_echoes_and_counts(device, monkeypatch):
     """A receiver of its own, a window that cuts, facets that turn away on the way, blocks that end anywhere."""
     scene = hills(8, BOTH, edge=0.4) + sarcl.Scene.facets(
@@ -110,6 +111,7 @@ def test_no_flash_falls_between_nodes(device, always):
     assert np.linalg.norm(raw.samples - wanted.samples) <= 1e-2 * np.linalg.norm(wanted.samples)
 
 
+@pytest.mark.costly
 def test_memory_for_amplitudes_keeps_to_the_budget(device):
     """Tiles in several calls, blocks of few pulses: the same echoes."""
     scene = hills(60)

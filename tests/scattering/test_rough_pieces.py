@@ -87,6 +87,7 @@ def test_facets_that_share_an_edge_are_cut_at_the_same_points_of_it(double):
     assert np.array_equal(*sides) and len(sides[0]) > 7 / 0.5
 
 
+@pytest.mark.costly
 def test_a_facet_of_a_million_pieces_is_cut_in_parts(double):
     large = np.array([[[0.0, 0, 0], [400, 0, 0], [0, 300, 9]]])
     pieces = cut(double, scene(large), 0.4, 0)

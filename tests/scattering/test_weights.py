@@ -114,6 +114,7 @@ def test_facets_keep_the_tolerance(device, kind, waveform):
 
 
 @pytest.mark.parametrize("kind", [pytest.param("aperture", marks=REPEATED), "pair"])
+@pytest.mark.costly
 def test_two_places_have_two_gains(device, kind):
     scene, tx = points() + facets(), track()
     rx = pointing.spotlight(sarcl.Trajectory(tx.times, tx.positions + np.array((900.0, -500, 400))), (30, 0, 0))
@@ -153,6 +154,7 @@ def test_scanning_draws_the_pattern(device):
     np.testing.assert_allclose(np.abs(raw.samples[:, middle]), wanted * shape, atol=2e-5)
 
 
+@pytest.mark.costly
 def test_left_out_of_the_beam_changes_nothing(device):
     """A strip much longer than the beam: most pairs are skipped, and the samples are those of all of them."""
     random = np.random.default_rng(5)
@@ -169,6 +171,7 @@ def test_left_out_of_the_beam_changes_nothing(device):
     assert np.linalg.norm(some.samples - every.samples) <= 1e-4 * np.linalg.norm(every.samples)
 
 
+@pytest.mark.costly
 def test_a_bright_plate_in_a_side_lobe_is_kept(device):
     """A mirror far outside the beam is brighter than all that is in it: none of its facets may be skipped."""
     tx = track(aim=(0, 0, 0))

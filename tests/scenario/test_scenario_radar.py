@@ -47,6 +47,7 @@ tolerance = 1e-3
 """
 
 
+@pytest.mark.costly
 def test_a_scenario_is_its_calls(device):
     from sarcl import pointing
 

@@ -97,6 +97,7 @@ def test_tone_and_sampled_pulses_carry_their_matched_spectrum(device):
         assert np.abs(raw.samples - wanted).max() < 1e-4
 
 
+@pytest.mark.costly
 def test_backprojection_is_the_adjoint_of_echo(device):
     random = np.random.default_rng(2)
     positions = random.uniform(-12, 12, (400, 3))
@@ -167,6 +168,7 @@ def test_default_window_holds_the_scene(device):
 
 
 @pytest.mark.filterwarnings("ignore:mesh too coarse")
+@pytest.mark.costly
 def test_the_back_of_a_body_is_dark(device):
     import trimesh
 
@@ -180,6 +182,7 @@ def test_the_back_of_a_body_is_dark(device):
     assert power[(depth > -3.5) & (depth < 0.5)].sum() > 0.9 * power.sum()
 
 
+@pytest.mark.costly
 def test_random_heights_follow_the_seed_and_nothing_else(device):
     axis = np.linspace(-5, 5, 30)
     ground = sarcl.Scene.from_heights(axis, axis, np.zeros((30, 30)), roughness=0.05)
@@ -235,6 +238,7 @@ def test_memory_limit_does_not_change_the_echoes(device):
     assert np.linalg.norm(parts.samples - whole.samples) <= 1e-6 * np.linalg.norm(whole.samples)
 
 
+@pytest.mark.costly
 def test_one_pulse_one_point_and_points_with_facets_work(device):
     one = sarcl.Trajectory([0.0], [[8e3, 0, 6e3]])
     both = sarcl.Scene.points([[0, 0, 2]]) + sarcl.Scene.from_heights([-1, 1], [-1, 1], np.zeros((2, 2)))

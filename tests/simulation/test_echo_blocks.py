@@ -322,6 +322,7 @@ def test_two_devices_of_a_kind_make_the_bits_of_one(case, pair, monkeypatch):
     assert both.report.device == f"{pair[0].info.name} + {pair[1].info.name}"
 
 
+@pytest.mark.slow
 def test_devices_of_two_kinds_agree_to_rounding(monkeypatch):
     working = [info.index for info in devices() if info.works]
     first = open_device(working[0])

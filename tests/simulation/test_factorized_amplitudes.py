@@ -86,6 +86,7 @@ def test_rough_facets_on_every_kind_of_track(device, track, tolerance):
     assert abs(away[0] - away[1]) <= 2e-3 * (raw.report.contributions_done + away[0])
 
 
+@pytest.mark.costly
 def test_polarisations_and_two_antennas(device):
     back = sarcl.Trajectory.line(start=(-6e3, 500, 8e3), velocity=(0, 80, 0), prf=200.0, n_pulses=200)
     for receiver in (None, back):
@@ -96,6 +97,7 @@ def test_polarisations_and_two_antennas(device):
             assert wrong <= 1e-2 * np.linalg.norm(direct.samples[i::4])
 
 
+@pytest.mark.costly
 def test_facets_with_a_coherent_part(device):
     compared(terrain(material=replace(ROUGH, height=0.01)), line(), 1e-2, device=device)
 
@@ -108,12 +110,14 @@ def test_a_specular_flash_in_the_middle_of_the_track(device, turn, tolerance):
     assert raw.report.measured_error <= raw.report.predicted_error <= tolerance
 
 
+@pytest.mark.costly
 def test_two_materials_at_once(device):
     both = terrain() + plate().moved((0, 0, 5))
     raw = echoes(both, line(300, aperture=400.0), 1e-2, check=True, device=device)
     assert raw.report.measured_error <= raw.report.predicted_error <= 1e-2
 
 
+@pytest.mark.slow
 def test_facets_that_moving_shadows_cross_are_added_directly(device):
     if device.info.vector_width == 1:
         pytest.skip("more than a minute with one lane on a CPU; shadows do not depend on lanes")
@@ -121,6 +125,7 @@ def test_facets_that_moving_shadows_cross_are_added_directly(device):
     assert 0 < raw.report.plan["facets added pulse by pulse"] < raw.report.plan["facets"]
 
 
+@pytest.mark.costly
 def test_facets_at_the_edge_of_the_range_window_are_added_directly(device):
     options = {"range_window": (-5.0, 4.0), "reference": (0.0, 0.0, 0.0), "device": device}
     raw, direct, _ = compared(terrain(), line(), 1e-2, **options)
@@ -129,6 +134,7 @@ def test_facets_at_the_edge_of_the_range_window_are_added_directly(device):
     assert outside[0] == outside[1] > 0
 
 
+@pytest.mark.costly
 def test_devices_with_one_lane_and_without_float64_and_little_memory(device):
     raw = echoes(terrain(), line(), 1e-3, device=device)
     for other, memory in ((device.one_lane(), None), (device.without_fp64(), None), (device, 3e6)):
@@ -136,6 +142,7 @@ def test_devices_with_one_lane_and_without_float64_and_little_memory(device):
         assert np.linalg.norm(same.samples - raw.samples) <= 5e-5 * np.linalg.norm(raw.samples)
 
 
+@pytest.mark.costly
 def test_channels_of_an_array(device):
     options = {"array": sarcl.AntennaArray.linear(2, spacing=0.5), "channels": "separated", "device": device}
     compared(terrain(), line(), 1e-2, **options)
@@ -159,6 +166,7 @@ def test_points_under_gains_and_spreading_loss(device, name):
     assert error <= 3e-3
 
 
+@pytest.mark.costly
 def test_facets_under_gains(device):
     compared(terrain(), SPOT, 1e-2, finer=8, antenna=sarcl.Antenna.gaussian(width=(0.004, 0.01)), device=device)
 

@@ -126,6 +126,7 @@ def test_receivers_elsewhere(device, tolerance):
     assert error_of(raw, cloud()) <= raw.report.predicted_error <= tolerance
 
 
+@pytest.mark.costly
 def test_devices_with_one_lane_and_without_float64(device):
     raw = factorized_echo(cloud(), line(), 1e-4, device=device)
     for other in (device.one_lane(), device.without_fp64()):
@@ -134,6 +135,7 @@ def test_devices_with_one_lane_and_without_float64(device):
         assert np.linalg.norm(same.samples - raw.samples) <= 2e-5 * np.linalg.norm(raw.samples)
 
 
+@pytest.mark.costly
 def test_points_that_some_pulses_do_not_see_are_added_directly(device):
     scene, window, track = cloud(), (-12.0, 9.0), circle(400)
     raw = factorized_echo(scene, track, 1e-3, device=device, range_window=window)
@@ -184,6 +186,7 @@ def test_cells_hold_their_points():
     assert (parents == np.repeat(np.arange(len(large)), np.diff(children))).all()
 
 
+@pytest.mark.costly
 def test_profiles_are_moved_and_interpolated_between_pulses_as_by_the_twin(device):
     scene, positions = cloud(), line(120)
     raw = factorized_echo(scene, positions, 1e-2, device=device)
@@ -262,6 +265,7 @@ def test_all_polarisations_and_progress(device):
     assert done == sorted(done) and done[-1] == 200 * 3000
 
 
+@pytest.mark.costly
 def test_auto_takes_levels_where_they_cost_less(device):
     many, positions = cloud(40_000), line(1000)
     raw = factorized_echo(many, positions, 1e-2, device=device, method="auto")
@@ -273,6 +277,7 @@ def test_auto_takes_levels_where_they_cost_less(device):
     assert error_of(raw, many, pulses=4) <= raw.report.predicted_error
 
 
+@pytest.mark.costly
 def test_facets_beside_points_are_added_directly(device):
     facets = sarcl.shapes.plate((2.0, 1.0)).moved((0, 0, 5))
     both = facets + cloud()
@@ -282,6 +287,7 @@ def test_facets_beside_points_are_added_directly(device):
     assert np.linalg.norm(raw.samples - direct.samples) <= 1.1e-3 * np.linalg.norm(direct.samples)
 
 
+@pytest.mark.costly
 def test_what_cannot_be_factorised_is_refused_with_the_reason_and_added_directly_by_auto(device):
     shaken = line() + np.random.default_rng(4).standard_normal((200, 3)) * 5
     near = np.stack([np.full(200, -30.0), np.linspace(-100, 100, 200), np.full(200, 30.0)], axis=1)
@@ -307,6 +313,7 @@ def test_the_forecast_of_factorised_echoes_is_that_of_their_run(device):
     assert (sarcl.echo(*arguments, tolerance=1e-2, device=device, check=False).samples == raw.samples).all()
 
 
+@pytest.mark.costly
 def test_channels_of_an_array(device):
     options = {"array": sarcl.AntennaArray.linear(2, spacing=0.5), "channels": "separated", "device": device}
     raw = factorized_echo(cloud(), line(), 1e-3, **options)

@@ -27,6 +27,7 @@ def plates():
 
 
 @pytest.mark.parametrize("make", [points, pytest.param(plates, marks=pytest.mark.slow)])
+@pytest.mark.costly
 def test_samples_alone_are_downloaded_and_meet_their_tolerance(device, make, monkeypatch):
     downloads, download = [], Device.download
 
@@ -105,6 +106,7 @@ def test_rows_that_work_groups_add_up_are_those_of_single_work_items(device, sce
     ],
     ids=["shadows", "channels", "beam"],
 )
+@pytest.mark.costly
 def test_facets_that_work_groups_add_up_are_those_of_single_work_items(device, options):
     axis = np.linspace(-4, 4, 6)
     scene = sarcl.Scene.from_heights(axis, axis, np.random.default_rng(0).normal(size=(6, 6)) * 0.3)
