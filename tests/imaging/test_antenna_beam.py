@@ -103,7 +103,7 @@ def strip():
 
 def test_points_read_their_cross_section_anywhere_in_the_beam(strip):
     raw, antenna, track, points = strip
-    grid = sarcl.ImageGrid.plane(center=MIDDLE, shape=(360, 72), spacing=(0.4, 1.5))
+    grid = sarcl.ImageGrid.plane(center=MIDDLE, shape=(412, 72), spacing=(0.35, 1.5))
     for window in (None, (("taylor", 35, 5), None)):
         image = sarcl.backproject(raw, grid, beam=(antenna, track), window=window, tolerance=1e-3)
         for point, seen in zip(points, sarcl.measure(image, near=points), strict=True):

@@ -189,6 +189,8 @@ def test_facets_near_the_vertical_through_an_antenna_are_refused_with_the_reason
 def test_auto_factorises_many_facets_and_the_forecast_says_so(device):
     if not device.info.fp64:
         pytest.skip("the host cuts the facets, and the forecast does not wait for that")
+    if device.info.kind == "gpu":
+        pytest.skip("a GPU adds so few pulses before the host has made cells")
     arguments = terrain(120, 100.0), CHIRP, line(1000)
     options = {"tolerance": 1e-2, "shadows": False, "check": False, "device": device}
     forecast = sarcl.plan(sarcl.echo, *arguments, **options)

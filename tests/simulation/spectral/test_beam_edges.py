@@ -112,7 +112,7 @@ def test_the_map_of_an_edge_is_the_sum_over_scatterers_and_pulses(side, device):
     for term in range(2):
         out = np.zeros((grid.count, 3), np.complex64)
         for tables, share in zip(transfer.tables[term], nodes.shares(places.sine, places.distance), strict=True):
-            over = np.concatenate([made for _, made in held.over_azimuth(b * share, 1e9)], axis=1)
+            over = np.concatenate([made for _, made in held.over_azimuth(b * share, whole, 1e9)], axis=1)
             held.add(over, whole, tables, transfer, f, out, 1e9)
         samples = np.fft.ifft(grid.folded(np.ascontiguousarray(out.T))) * grid.n_lags / grid.period
 
