@@ -25,11 +25,11 @@ def ground(n, half=10.0, seed=None):
     return of_grid(np.stack([*np.meshgrid(axis, axis), heights], axis=-1))
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(4))
 def test_a_terrain_shades_itself_by_its_far_slopes_alone(seed):
     """Hills with facets steeper than the lines of sight, against polygons of all facets at every pulse."""
     facets = ground(24, half=6.0, seed=seed)
-    ends = [arc(start=start, elevation=0.6, width=0.2) for start in (0.0, 1.2)[: 1 + seed % 2]]
+    ends = [arc(n=3, start=start, elevation=0.6, width=0.2) for start in (0.0, 1.2)[: 1 + seed % 2]]
     is_far = far_slopes(facets, ends)
     assert 0 < is_far.sum() < 0.2 * len(facets)
     is_lit = never_shaded(facets, np.zeros(len(facets), bool), facets[is_far], ends)
@@ -37,7 +37,7 @@ def test_a_terrain_shades_itself_by_its_far_slopes_alone(seed):
     assert not is_lit[is_far].any()
     far = facets[is_far].mean(axis=1)  # facets that lie nearest to these count most
     gaps = [np.linalg.norm(far - facet.mean(axis=0), axis=1).min() for facet in facets[is_lit]]
-    for facet in facets[is_lit][np.argsort(gaps)[:40]]:
+    for facet in facets[is_lit][np.argsort(gaps)[:6]]:
         assert least_share(facet, facets, ends) > 1 - 1e-6
 
 
