@@ -17,8 +17,9 @@ from sarcl.reference.merge import expand, merge
 from sarcl.scattering.antenna_weights import AntennaWeights
 from sarcl.simulation.factorized._ascent import Ascent
 from sarcl.simulation.factorized.cells import ScattererCells, scatterers_in_window
-from sarcl.simulation.factorized.levels import Amplitudes, plan_levels
+from sarcl.simulation.factorized.levels import COSTS_MORE, Amplitudes, plan_levels
 from sarcl.simulation.factorized.scatterers import Channel, Scatterers
+from sarcl.simulation.points import point_plan
 from sarcl.simulation.spreading import Band
 
 CHIRP = sarcl.Waveform.chirp(center=9.6e9, bandwidth=300e6, duration=2e-6)
@@ -275,6 +276,36 @@ def test_auto_takes_levels_where_they_cost_less(device):
     few = factorized_echo(many, line(6), 1e-2, device=device, method="auto")
     assert few.report.plan["method"] == "spread"
     assert error_of(raw, many, pulses=4) <= raw.report.predicted_error
+
+
+def test_plans_that_cost_more_than_the_direct_method_are_given_up():
+    scene, positions = cloud(), line(600)
+    antennas = PulseGeometry.sampled(
+        positions,
+        positions,
+        np.linalg.norm(positions, axis=1),
+        first=9.5e9,
+        step=1e6,
+        n_samples=300,
+        window=(-1e3, 1e3),
+    )
+    task = ScattererCells(scene.positions), antennas, Band(300, 300e6, 9.65e9), 1e-2
+    amplitudes = Amplitudes(lambda leaf: leaf.interpolator.error)
+    plan = plan_levels(*task, amplitudes)
+    assert plan_levels(*task, amplitudes, most=plan.cost).cost == plan.cost
+    # the cheapest candidate is refused by its own cost, and by what its ratios of decimation become
+    for most in (0.0, 0.5 * plan.cost, 0.999 * plan.cost):
+        assert plan_levels(*task, amplitudes, most=most) == COSTS_MORE
+
+
+@pytest.mark.parametrize("carrier", [9.6e9, 9.6123456789e9])
+def test_echoes_of_points_are_planned_once(monkeypatch, carrier):
+    calls, of_levels = [], point_plan.plan_levels
+    monkeypatch.setattr(point_plan, "plan_levels", lambda *a, **k: calls.append(a) or of_levels(*a, **k))
+    pulse = sarcl.Waveform.chirp(center=carrier, bandwidth=300e6, duration=1e-6)
+    track = sarcl.Trajectory(np.arange(997) / 997, line(997))
+    raw = sarcl.echo(cloud(40_000), pulse, track, tolerance=1e-2, method="factorized", check=False)
+    assert raw.report.plan["method"] == "factorized" and len(calls) == 1
 
 
 @pytest.mark.costly
