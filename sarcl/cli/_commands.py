@@ -87,7 +87,7 @@ def simulate(args: argparse.Namespace, job: Job) -> int:
     grid = scenario.build_grid() if scenario.grid is not None else None
     devices = open_devices(args.device)
     options: dict[str, Any] = {} if args.tolerance is None else {"tolerance": args.tolerance}
-    on: dict[str, Any] = {"device": devices if scenario.simulates_in_blocks else devices[0]}
+    on: dict[str, Any] = {"device": devices}
     if scenario.orbit is not None:
         job.say(scenario.describe_orbit())
     if args.dry_run:

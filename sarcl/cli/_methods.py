@@ -107,10 +107,8 @@ def check_default_grid(args: argparse.Namespace, raw: PhaseHistory) -> None:
 
 
 def echo_pieces(args: argparse.Namespace, scenario: Scenario) -> dict[str, Any]:
-    """The arguments --tile and --resume of `sarcl simulate`. ValueError where the echoes are not computed in pieces."""
+    """The arguments --tile and --resume of `sarcl simulate`. ValueError where they have noise."""
     running = {name: getattr(args, name) for name in BLOCKS if getattr(args, name) is not None}
-    if running and not scenario.simulates_in_blocks:
-        raise ValueError(f"--{next(iter(running))} is for echoes that are computed in pieces; leave it out")
     if running and scenario.noise is not None:
         raise ValueError(
             f"--{next(iter(running))} keeps tiles beside a file of echoes, and [noise] is added to all at once, in "

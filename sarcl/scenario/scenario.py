@@ -207,11 +207,6 @@ class Scenario:
         return replace(forecast, run=lambda: self._noisy(forecast.run(), level))
 
     @property
-    def simulates_in_blocks(self) -> bool:
-        """Whether `simulate` takes several devices, and pieces."""
-        return in_blocks(_simulating.section_of(self))
-
-    @property
     def focuses_in_blocks(self) -> bool:
         """Whether `focus` takes several devices, and pieces."""
         return in_blocks(_focusing.section_of(self))
