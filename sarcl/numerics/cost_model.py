@@ -60,7 +60,7 @@ LEAF_LANES = 8.0  # lanes of a profile's vectors that hold no scatterer, about
 GAIN = 4.0  # per scatterer and kept pulse, or pulse: gains of antennas, spreading loss
 EXPAND_TAP, EXPAND_FILTER_TAP = 0.012, 0.012  # per sample of a cell's profile that is moved to a pulse of a larger cell
 EXPAND_ROW = 24.0  # per such profile
-CELL_POINT = 70.0  # per point: cells and their tables
+CELL_POINT = 20.0  # per point: cells and their tables, beyond the tiles of the direct method (2026-11-27)
 CELL_FACET = 200.0  # per facet: the same, and its numbers, which the host sorts (2.0e6 pieces, 2026-11-27)
 # Pulses that a GPU adds directly while the host makes cells: 0.06 ns per pair, and 0.43 us per point more than tiles of
 # the direct method take (NVIDIA H100).
