@@ -7,6 +7,7 @@ from collections import defaultdict
 from pathlib import Path
 
 import pytest
+from helpers.block_runs import client, pair  # noqa: F401  # fixtures
 from helpers.devices import ALONE, TWINS, opened, variants
 
 

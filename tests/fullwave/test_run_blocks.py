@@ -14,6 +14,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from helpers.block_runs import Stopped, names, tiles
 from helpers.devices import as_gpu
 
 import sarcl
@@ -21,7 +22,6 @@ from sarcl import Material, shapes
 from sarcl.blocks import checkpoint
 from sarcl.cli import parser
 from sarcl.opencl.choose_device import open_device
-from sarcl.opencl.device import Device
 from sarcl.opencl.device_list import devices
 from sarcl.opencl.failures import DeviceFailed
 
@@ -68,13 +68,6 @@ def whole():
     return get
 
 
-@pytest.fixture
-def pair():
-    """Two devices of one kind: one device, and its double."""
-    first = open_device()
-    return [first, Device(first.info, first._raw)]
-
-
 def same(one, two):
     """Whether samples and numbers of the reports are those of the same runs."""
     told = [{k: v for k, v in raw.report.plan.items() if k not in ("run_seconds", "from files")} for raw in (one, two)]
@@ -82,18 +75,6 @@ def same(one, two):
     assert (one.report.measured_error, one.report.model_error) == (two.report.measured_error, two.report.model_error)
     assert one.report.contributions_done == two.report.contributions_done
     return np.array_equal(one.samples[:], two.samples[:])
-
-
-def tiles(folder):
-    return sorted(folder.glob("*.anchors/bands-*.tiles"))
-
-
-def names(folder):
-    return sorted(path.name for path in folder.iterdir())
-
-
-class Stopped(Exception):
-    pass
 
 
 def stop_after(runs):
@@ -132,7 +113,8 @@ def test_a_piece_of_finished_echoes_does_nothing(tmp_path):
 
 def test_the_plain_call_completes_what_pieces_began(whole, tmp_path):
     assert of("all", out=tmp_path / "a.h5", tile=(1, 3)) is None
-    assert len(tiles(tmp_path)) == 2  # of 8: two anchors, a check and an error of the grid, sent as H and as V
+    # of 8: two anchors, a check and an error of the grid, sent as H and as V
+    assert len(tiles(tmp_path, "anchors")) == 2
     raw = of("all", out=tmp_path / "a.h5")
     assert same(raw, whole("all")) and raw.report.plan["from files"] == "2 runs"
     assert names(tmp_path) == ["a.h5"]
@@ -152,7 +134,7 @@ def test_a_call_that_was_stopped_goes_on(whole, tmp_path, monkeypatch):
     monkeypatch.setattr(checkpoint, "PERIOD", 0.0)
     with pytest.raises(Stopped):
         of("mirrored", out=tmp_path / "a.h5", resume=True, progress=stop_after(12))
-    n = len(tiles(tmp_path))
+    n = len(tiles(tmp_path, "anchors"))
     assert 0 < n < 3 and not (tmp_path / "a.h5").exists()
     raw = of("mirrored", out=tmp_path / "a.h5")
     assert raw.report.plan["from files"] == f"{n} runs" and same(raw, whole("mirrored"))
@@ -167,12 +149,12 @@ def test_what_ends_a_short_call_leaves_nothing_and_a_long_one_keeps_its_runs(tmp
     monkeypatch.setattr(checkpoint, "time", SimpleNamespace(monotonic=itertools.count(0, 100.0).__next__))
     with pytest.raises(Stopped):
         of("mirrored", out=tmp_path / "a.h5", progress=stop_after(12))
-    assert tiles(tmp_path)
+    assert tiles(tmp_path, "anchors")
 
 
 def test_damaged_files_of_runs_are_computed_again(whole, tmp_path, caplog):
     of("mirrored", out=tmp_path / "a.h5", tile=(1, 2))
-    (file,) = tiles(tmp_path)
+    (file,) = tiles(tmp_path, "anchors")
     damaged = bytearray(file.read_bytes())
     damaged[-100] ^= 1
     file.write_bytes(damaged)
@@ -233,14 +215,14 @@ def test_killed_calls_lose_the_run_in_progress_alone_and_end_with_the_same_bits(
     (tmp_path / "killed").mkdir()
     path, hit = tmp_path / "killed" / "a.h5", 0
     for number in range(4):
-        before = len(tiles(path.parent))
+        before = len(tiles(path.parent, "anchors"))
         process = subprocess.Popen([sys.executable, "-c", KILLED, str(path)])
-        while process.poll() is None and len(tiles(path.parent)) < before + 1 + number % 2:
+        while process.poll() is None and len(tiles(path.parent, "anchors")) < before + 1 + number % 2:
             time.sleep(0.001)
         time.sleep(0.02 * number)
         process.kill()
         hit += process.wait() == -signal.SIGKILL
-        assert len(tiles(path.parent)) > before or path.exists()
+        assert len(tiles(path.parent, "anchors")) > before or path.exists()
     for name in ("killed/a.h5", "b.h5"):
         subprocess.run([sys.executable, "-c", KILLED, str(tmp_path / name)], check=True)
     assert hit >= 3 and names(tmp_path) == ["b.h5", "killed"] and names(tmp_path / "killed") == ["a.h5"]
@@ -303,7 +285,7 @@ def test_forecasts_take_the_same_options_and_run_with_them(pair, whole, tmp_path
     piece = sarcl.plan(
         sarcl.fullwave_echo, scene, CHIRP, track, tile=(1, 2), out=tmp_path / "b.h5", **options
     )  # fmt: skip
-    assert piece.run() is None and tiles(tmp_path)
+    assert piece.run() is None and tiles(tmp_path, "anchors")
 
 
 # ---- options and the command line
@@ -357,16 +339,6 @@ def test_pieces_on_the_command_line(tmp_path, monkeypatch, capsys):
 
 
 # ---- dask
-
-
-@pytest.fixture(scope="module")
-def client():
-    distributed = pytest.importorskip("distributed", reason="dask is not installed: pip install 'sarcl[dask]'")
-    with (
-        distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster,
-        distributed.Client(cluster) as client,
-    ):
-        yield client
 
 
 @pytest.mark.parametrize("case", CASES)

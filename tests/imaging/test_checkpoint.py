@@ -20,6 +20,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from helpers.block_runs import Stopped, names, tiles
 from helpers.cases import noise_history
 
 import sarcl
@@ -48,18 +49,6 @@ def raw():
 def whole(raw):
     """GRID focused in one go."""
     return sarcl.backproject(raw, GRID)
-
-
-def names(folder):
-    return sorted(p.name for p in folder.iterdir())
-
-
-def tiles(folder):
-    return sorted(p for p in folder.glob("*.parts/bands-*.tiles"))
-
-
-class Stopped(Exception):
-    pass
 
 
 def stop_after(pairs):

@@ -15,6 +15,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from helpers.block_runs import Stopped, names, tiles
 from helpers.devices import as_gpu
 
 import sarcl
@@ -23,7 +24,6 @@ from sarcl.blocks import checkpoint
 from sarcl.cli import parser
 from sarcl.io import output_paths
 from sarcl.opencl.choose_device import open_device
-from sarcl.opencl.device import Device
 from sarcl.opencl.device_list import devices
 from sarcl.opencl.failures import DeviceFailed
 from sarcl.simulation._echo_blocks import EchoEngine
@@ -72,18 +72,6 @@ def whole_wide():
 
 def same(one, two):
     return np.array_equal(one.samples[:], two.samples[:])
-
-
-def names(folder):
-    return sorted(p.name for p in folder.iterdir())
-
-
-def tiles(folder):
-    return sorted(folder.glob("*.parts/bands-*.tiles"))
-
-
-class Stopped(Exception):
-    pass
 
 
 def stop_after(share):
@@ -284,13 +272,6 @@ def test_killed_runs_lose_no_tile_and_end_with_the_same_bits(tmp_path, kills):
 # ---- several devices
 
 
-@pytest.fixture
-def pair():
-    """Two devices of one kind: one device, and its double."""
-    first = open_device()
-    return [first, Device(first.info, first._raw)]
-
-
 def taken_by(monkeypatch, wait=True):
     """The blocks that each device computes; none computes a second one before all have begun."""
     taken, fill, begun = {}, EchoEngine.fill, threading.Barrier(2, timeout=60)
@@ -441,16 +422,6 @@ def test_pieces_on_the_command_line(tmp_path, capsys):
 
 
 # ---- dask
-
-
-@pytest.fixture(scope="module")
-def client():
-    distributed = pytest.importorskip("distributed", reason="dask is not installed: pip install 'sarcl[dask]'")
-    with (
-        distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster,
-        distributed.Client(cluster) as client,
-    ):
-        yield client
 
 
 @pytest.mark.parametrize("case", CASES)

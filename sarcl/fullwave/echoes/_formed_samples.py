@@ -58,10 +58,10 @@ class AnchorSearches:
             others += [Run(kind, sent, pulse) for kind in ((COARSE, LOSSES) if self.task.losses else (COARSE,))]
         return others
 
-    def found(self, runs: GridRuns) -> dict[str, Anchored]:
+    def anchored(self, runs: GridRuns) -> dict[str, Anchored]:
         """Run all anchors, and what they are compared with; the echoes of each polarisation that is sent."""
         runs.compute(self.first)
-        found: dict[str, Anchored] = {}
+        anchored: dict[str, Anchored] = {}
         while self._asked:
             runs.compute(self._runs())
             for sent, pulses in list(self._asked.items()):
@@ -69,10 +69,10 @@ class AnchorSearches:
                 try:
                     self._asked[sent] = self._searches[sent].send(echoes)
                 except StopIteration as end:
-                    found[sent] = end.value
+                    anchored[sent] = end.value
                     del self._asked[sent]
-        runs.compute(run for sent, one in found.items() for run in self._others(sent, one.pulses))
-        return {sent: found[sent] for sent, _ in self.task.sendings}
+        runs.compute(run for sent, one in anchored.items() for run in self._others(sent, one.pulses))
+        return {sent: anchored[sent] for sent, _ in self.task.sendings}
 
 
 def formed_samples(searches: AnchorSearches, runs: GridRuns, clock: Clock) -> FormedSamples:
@@ -80,14 +80,14 @@ def formed_samples(searches: AnchorSearches, runs: GridRuns, clock: Clock) -> Fo
     task = searches.task
     samples = np.empty((len(task.tx), len(task.polarizations), len(task.frequencies)), np.complex64)
     sums = ErrorSums()
-    found = searches.found(runs)
+    anchored = searches.anchored(runs)
     for sent, indices in task.sendings:
-        samples[:, indices] = found[sent].samples
-        sums.add(task, sent, found[sent])
+        samples[:, indices] = anchored[sent].samples
+        sums.add(task, sent, anchored[sent])
         if searches.coarse:
             sums.add_grid_error(task, searches.coarse, runs, sent)
         if task.options.check:
-            sums.add_check(task, runs, sent, found[sent])
+            sums.add_check(task, runs, sent, anchored[sent])
     clock.lap("forming")
     return FormedSamples(samples, _report(task, sums, runs, clock))
 
@@ -121,12 +121,12 @@ def checked_anchors(asked: object, n_pulses: int) -> str | int | np.ndarray:
     return pulses
 
 
-def error_terms(forming: float, left: float, options: FullwaveOptions) -> tuple[ErrorTerm, ...]:
-    """Terms of the error of samples: waveform forming, and the part `left` of the currents that runs end before."""
+def error_terms(forming: float, truncation: float, options: FullwaveOptions) -> tuple[ErrorTerm, ...]:
+    """Terms of the error of samples: waveform forming, and the part of the currents that runs end before."""
     remedy = SMALLER_TOLERANCE if isinstance(options.anchors, str) else "more anchors"
     return (
         ErrorTerm("waveform forming", forming, remedy),
-        ErrorTerm("end of runs", left, SMALLER_TOLERANCE),
+        ErrorTerm("end of runs", truncation, SMALLER_TOLERANCE),
     )
 
 
@@ -190,7 +190,7 @@ def _report(task: FullwaveTask, sums: ErrorSums, runs: GridRuns, clock: Clock) -
         "mirrored": counts.mirrored,
         **task.grid_choices,
         "steps": int(counts.steps / counts.runs) if counts.runs else 0,
-        "left": float(f"{counts.left:.1e}"),
+        "left": float(f"{counts.truncation:.1e}"),
         "run_bytes": round(task.run_bytes),
         "max_bytes": round(task.max_bytes),
         "parts": len(task.parts),
@@ -200,7 +200,7 @@ def _report(task: FullwaveTask, sums: ErrorSums, runs: GridRuns, clock: Clock) -
         **task.motion,
         **({"from files": f"{runs.from_files} runs"} if runs.from_files else {}),
     }
-    terms = error_terms(sums.forming_error, counts.left, task.options)
+    terms = error_terms(sums.forming_error, counts.truncation, task.options)
     return Report(
         plan=plan,
         tolerance=task.options.tolerance,

@@ -128,11 +128,11 @@ class GridRuns:
     def _warn_of_resonance(self) -> None:
         """None where a gap, which has been warned of, is the reason."""
         total = self.total
-        if total.left > UNFINISHED and self.bands.task.target.gap is None and not self._is_warned:
+        if total.truncation > UNFINISHED and self.bands.task.target.gap is None and not self._is_warned:
             self._is_warned = True
             warn(
-                f"the run of pulse {total.pulse} ended after {total.ended} steps, and {total.left:.1e} of the currents "
-                "would have followed: the bodies resonate, and that part of the echo is missing; "
+                f"the run of pulse {total.pulse} ended after {total.ended} steps, and {total.truncation:.1e} of the "
+                "currents would have followed: the bodies resonate, and that part of the echo is missing; "
                 "report.plan['left'] is the largest of all runs"
             )
 

@@ -36,7 +36,7 @@ class RunTally:
     """Counts of runs for anchors: see blocks.bands.Tally.
 
     steps, seconds  of all;  mirrored  anchors that runs of others served
-    left            largest part of the currents that would have followed after a run: that of `pulse`, after `ended`
+    truncation      largest part of the currents that would have followed after a run: that of `pulse`, after `ended`
                     steps
     """
 
@@ -44,18 +44,18 @@ class RunTally:
     steps: int = 0
     seconds: float = 0.0
     mirrored: int = 0
-    left: float = 0.0
+    truncation: float = 0.0
     pulse: int = 0
     ended: int = 0
 
     def __add__(self, other: RunTally) -> RunTally:
-        worst = self if self.left >= other.left else other
+        worst = self if self.truncation >= other.truncation else other
         return RunTally(
             self.runs + other.runs,
             self.steps + other.steps,
             self.seconds + other.seconds,
             self.mirrored + other.mirrored,
-            worst.left,
+            worst.truncation,
             worst.pulse,
             worst.ended,
         )
@@ -188,11 +188,12 @@ class RunEngine:
     ) -> RunTally:
         """See Engine; the memory of a run is that of its task."""
         total, count = RunTally(), self.bands.count
+        total_steps = count(first, last)
         for band in range(first, last):
-            before, size, whole = count(first, band), count(band, band + 1), count(first, last)
+            before, steps = count(first, band), count(band, band + 1)
 
-            def share_done(share: float, before: int = before, size: int = size, whole: int = whole) -> None:
-                on_progress((before + share * size) / whole)
+            def share_done(share: float, before: int = before, steps: int = steps) -> None:
+                on_progress((before + share * steps) / total_steps)
 
             total += self._one(band, flat, share_done)
         clock.lap(STAGE)
@@ -212,7 +213,7 @@ class RunEngine:
             steps=end.steps,
             seconds=time.perf_counter() - started,
             mirrored=len(formed) - 1,
-            left=end.left,
+            truncation=end.left,
             pulse=run.pulse,
             ended=end.steps,
         )

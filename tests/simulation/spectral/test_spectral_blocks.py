@@ -12,6 +12,7 @@ import time
 
 import numpy as np
 import pytest
+from helpers.block_runs import Stopped, names, tiles
 from helpers.devices import as_gpu
 
 import sarcl
@@ -19,7 +20,6 @@ from sarcl import pointing, shapes
 from sarcl.blocks import checkpoint
 from sarcl.cli import parser
 from sarcl.opencl.choose_device import open_device
-from sarcl.opencl.device import Device
 from sarcl.opencl.device_list import devices
 from sarcl.opencl.failures import DeviceFailed
 from sarcl.simulation.spectral._spectral_blocks import SpectrumEngine
@@ -65,30 +65,11 @@ def whole():
     return get
 
 
-@pytest.fixture
-def pair():
-    """Two devices of one kind: one device, and its double."""
-    first = open_device()
-    return [first, Device(first.info, first._raw)]
-
-
 def same(one, two):
     told = [{k: v for k, v in raw.report.plan.items() if k != "from files"} for raw in (one, two)]
     assert told[0] == told[1] and one.report.error_terms == two.report.error_terms
     assert one.report.contributions_done == two.report.contributions_done
     return np.array_equal(one.samples[:], two.samples[:])
-
-
-def names(folder):
-    return sorted(path.name for path in folder.iterdir())
-
-
-def tiles(folder):
-    return sorted(folder.glob("*.parts/bands-*.tiles"))
-
-
-class Stopped(Exception):
-    pass
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -308,16 +289,6 @@ def test_pieces_on_the_command_line(tmp_path, monkeypatch, capsys):
 
 
 # ---- dask
-
-
-@pytest.fixture(scope="module")
-def client():
-    distributed = pytest.importorskip("distributed", reason="dask is not installed: pip install 'sarcl[dask]'")
-    with (
-        distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster,
-        distributed.Client(cluster) as client,
-    ):
-        yield client
 
 
 @pytest.mark.parametrize("case", CASES)
