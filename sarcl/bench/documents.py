@@ -26,7 +26,7 @@ Document = dict[str, Any]
 
 @dataclass(frozen=True, kw_only=True)
 class Measuring:
-    """How anything is measured.
+    """What a benchmark measures, on which devices, and how often.
 
     sizes, tolerances  of the tasks: at least 8; relative errors, above 0
     devices   as `sarcl.devices` names them; None: all that work;  no_fp64  measure each again without float64

@@ -51,12 +51,12 @@ def refuse_unseen(
     pulses = spread_over(len(antennas), SAMPLES)
     if not len(few) or np.logical_and(*bounds.may_see(few[:, None], pulses)).any():
         return
-    whole = box(np.concatenate([scene.positions, scene.triangles.reshape(-1, 3)]))
+    extent = box(np.concatenate([scene.positions, scene.triangles.reshape(-1, 3)]))
     ever_in_window = ever_in_beam = False
     cells: np.ndarray | None = None
     for start in range(0, len(antennas), PULSES):
         pulses = np.arange(start, min(start + PULSES, len(antennas)))
-        in_window, in_beam = bounds.may_see(corners(whole)[None], pulses)
+        in_window, in_beam = bounds.may_see(corners(extent)[None], pulses)
         unsure = pulses[(in_window & in_beam)[:, 0]]
         if len(unsure):
             cells = _cells(scene, places) if cells is None else cells

@@ -50,7 +50,7 @@ def run_job(task: FullwaveTask, bands: RunBands, anchors: str | int | np.ndarray
 
 @dataclass(eq=False)
 class RunProgress:
-    """Progress of one round of runs after the other, as that of one work: its total grows with every round.
+    """Progress of rounds of runs, counted together: the total grows with every round.
 
     report  called as report(stage, done, total), or None
     """
@@ -60,13 +60,13 @@ class RunProgress:
     _total: int = 0
 
     def __call__(self, stage: str, done: int, total: int) -> None:
-        """Steps that are done of this round, and all of it."""
+        """Report the steps that are done of this round, and its steps."""
         if self.report:
             self.report(stage, self._before + done, self._before + total)
         self._total = total
 
     def round_done(self) -> None:
-        """All runs of a round are done."""
+        """Count the steps of a round whose runs are all done."""
         self._before, self._total = self._before + self._total, 0
 
 
@@ -95,7 +95,7 @@ class GridRuns:
         return [(n, n + 1) for n in numbers if not self._echoes.has(self.bands.extent(n, n + 1))]
 
     def _serve(self, run: Run, serving: dict[Run, tuple[Run, int]]) -> None:
-        """Note the run that gives the echoes of one: an anchor has its own unless the run of another served it."""
+        """Store the run that gives the echoes of `run`: itself, unless a mirrored anchor gave them."""
         if run not in serving:
             serving[run] = run, 0
             twin = self.bands.twin(run)
@@ -126,7 +126,7 @@ class GridRuns:
         return rows.reshape(self.bands.shape(own))[part]
 
     def _warn_of_resonance(self) -> None:
-        """None where a gap, which has been warned of, is the reason."""
+        """Warn once of a run that ended before its currents had decayed; bodies with a gap are named before."""
         total = self.total
         if total.truncation > UNFINISHED and self.bands.task.target.gap is None and not self._is_warned:
             self._is_warned = True

@@ -39,11 +39,11 @@ class Scratch:
         if self.whole is not None:
             return self.whole[first:stop]
         out = np.empty((stop - first, self.shape[1]), np.complex64)
-        left = out.view(np.uint8).ravel().data
+        rest = out.view(np.uint8).ravel().data
         with self._lock:
             self.file.seek(8 * first * self.shape[1])
-            while len(left):
-                left = left[self.file.readinto(left) :]
+            while len(rest):
+                rest = rest[self.file.readinto(rest) :]
         return out
 
     def put(self, first: int, rows: np.ndarray) -> None:
@@ -52,11 +52,11 @@ class Scratch:
             if rows.base is not self.whole:  # else they are these rows
                 self.whole[first : first + len(rows)] = rows
             return
-        left = np.ascontiguousarray(rows, np.complex64).view(np.uint8).ravel().data
+        rest = np.ascontiguousarray(rows, np.complex64).view(np.uint8).ravel().data
         with self._lock:
             self.file.seek(8 * first * self.shape[1])
-            while len(left):
-                left = left[self.file.write(left) :]
+            while len(rest):
+                rest = rest[self.file.write(rest) :]
 
     def columns(self, first: int, stop: int, room: float, rows: slice = slice(None)) -> np.ndarray:
         """Columns first ... stop - 1 of some rows, default all; room  bytes for the rows that are read for them."""
