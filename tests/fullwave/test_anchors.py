@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from helpers.forming_cases import case
+from forming_cases import case
 
 from sarcl.fullwave.anchors import ENOUGH, FIRST, LEAST, anchored
 
