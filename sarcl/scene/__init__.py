@@ -7,6 +7,7 @@ For other folders:
     shapes      solids of exact dimensions as facets: sphere, box, cone, tank ...
     terrain     facets over grids of heights, and heights above them
     triangles   areas, normals and centroids of triangles; cutting; rotations
+    wedges      edges between facets, and borders of sheets
 
 For this folder alone:
 

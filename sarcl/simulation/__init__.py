@@ -18,6 +18,7 @@ For other folders:
     spreading          plan, tiles and sums that points and facets share
     track_options      options that every verb of echoes shares
     channels/          echoes of the channels of an array
+    edges/             echoes of the edges of conductors
     facets/            echoes of facets, directly or factorised
     factorized/        scatterers spread about small cells at few antenna positions, and cells joined level by level
     points/            echoes of points, directly or factorised

@@ -142,6 +142,7 @@ def description(task: EchoTask, shape: tuple[int, ...]) -> dict[str, Any]:
         "tolerance": options.tolerance,
         "polarization": ", ".join(request.polarizations),
         "seed": options.seed,
+        "edges": request.crease,
         "skip": ", ".join(sorted(request.skips)),
     }
     subjects = {"scene": task.original, "waveform": task.waveform, "track": task.given_track}

@@ -29,7 +29,7 @@ from .echo_output import bytes_of
 from .echo_task import EchoTask
 from .factorized.spreader import FactorizedSpreader
 from .scene_echoes import Added, SceneEchoes
-from .scene_plan import SHADOWS, parts_of, samples_shadows
+from .scene_plan import EDGES, SHADOWS, parts_of, samples_shadows
 from .scene_preparation import warn_of_curves
 from .spectral.spectral_task import spectral_task
 
@@ -140,6 +140,8 @@ def _allotted(planned: PlannedEchoes) -> tuple[ErrorTerm, ...]:
         if samples_shadows(request, scene.seen):
             most = SHADOWS * request.tolerance / parts_of(scene.seen.scene)
             terms.append(ErrorTerm("shadows", most, SMALLER_TOLERANCE))
+    if request.crease is not None:
+        terms.append(ErrorTerm("edges", EDGES * request.tolerance, SMALLER_TOLERANCE))
     return planned.method.between(tuple(terms))
 
 

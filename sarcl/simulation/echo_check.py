@@ -12,6 +12,7 @@ from ..numerics.pulse_geometry import PulseGeometry
 from ..scattering.antenna_weights import AntennaWeights
 from ..scattering.facets import FacetSet, Light
 from ..scattering.scatterers import Points
+from .edges.edge_echoes import EdgeEchoes
 from .facets.exact_facets import facet_samples, inside_window
 from .scene_echoes import SceneEchoes
 from .spreading import ChannelView
@@ -106,6 +107,9 @@ def exact(
         if part is not None:
             value, power = _exact(part, view, pulse)
             values, powers = values + value, powers + power
+    if scene.edges is not None:
+        value, power, _ = EdgeEchoes(scene.edges, view).samples(pulse, frequencies, exact=True)
+        values, powers = values + value, powers + power
     return values, powers
 
 

@@ -42,6 +42,7 @@ class EchoRequest:
 
     tolerance  of each channel;  vertical  (3,);  budget  bytes on the device;  host  bytes for facets that are cut
     method     by which points are added: "direct", "factorized" or "auto"
+    crease     rad, angle between normals of facets at an edge, at least; None: edges do not diffract
     """
 
     device: Device
@@ -58,6 +59,7 @@ class EchoRequest:
     clock: Clock = field(default_factory=Clock)
     limits: EchoLimits = EchoLimits()
     method: str = "direct"
+    crease: float | None = None
 
     @classmethod
     def of(cls, options: SceneOptions, scene: Scene, device: Device | None = None) -> EchoRequest:

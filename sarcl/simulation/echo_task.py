@@ -54,7 +54,11 @@ def echo_task(scene: Scene, waveform: Waveform, track: Trajectory, options: Echo
     """The task of these arguments; opens the device."""
     check_subjects(scene, waveform, track)
     devices = options.devices()
-    request = replace(EchoRequest.of(options, scene, devices[0]), method=options.method)
+    request = replace(
+        EchoRequest.of(options, scene, devices[0]),
+        method=options.method,
+        crease=options.crease if options.edges else None,
+    )
     scene.kept.limit(KEPT * request.budget)
     point = scene.center if options.reference is None else np.asarray(options.reference)
     sends, hears, motion = echo_sampling.in_flight(track, options.receiver, scene, point)

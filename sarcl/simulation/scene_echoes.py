@@ -20,6 +20,7 @@ from ..scattering.scatterers import Points
 from ..scattering.subdivision import Subdivision
 from ._unseen_scene import OUTSIDE_BEAM, OUTSIDE_WINDOW
 from .echo_request import EchoRequest
+from .edges.edge_echoes import EdgeEchoes, PreparedEdges
 from .facets.exact_facets import ExactFacets
 from .facets.facet_method import facet_echoes
 from .facets.facet_spreading import FacetSpreader, TiledFacets
@@ -45,6 +46,7 @@ class SceneEchoes:
     mesh_warnings          what a report says of meshes that are too coarse
     error_budget           the share of the tolerance that points have, and facets
     shadow_terms           errors of shadows that are counted in samples, relative to the norm of the facets
+    edges                  edges that diffract, None where none are asked for
     """
 
     request: EchoRequest
@@ -60,10 +62,11 @@ class SceneEchoes:
     error_budget: float
     shadow_terms: tuple[ErrorTerm, ...]
     n_pulses: int
+    edges: PreparedEdges | None = None
 
     def __len__(self) -> int:
-        """Number of points and facets."""
-        return sum(len(part) for part in (self.points, *self.facets) if part is not None)
+        """Number of points, facets and pieces of edges."""
+        return sum(len(part) for part in (self.points, *self.facets, self.edges) if part is not None)
 
     @property
     def shadow_words(self) -> dict[str, Any]:
@@ -144,7 +147,7 @@ class SceneEchoes:
         )
         points: PointSpreader | None = None
         parts: list[tuple[ErrorTerm, dict[str, Any]]] = []
-        spreaders: list[FacetSpreader | ExactFacets | FactorizedSpreader] = []
+        spreaders: list[FacetSpreader | ExactFacets | FactorizedSpreader | EdgeEchoes] = []
         stop, reason = first + len(antennas), ""
         if self.points is not None and self.prepared_points is not None and request.same:
             nodes = chebyshev(waveform.center, waveform.bandwidth, self.n_nodes)
@@ -176,10 +179,16 @@ class SceneEchoes:
             raise NotApplicable(f'method="factorized" is not possible: {text}; pass method="auto"')
         if spread:  # relative to the norm of the facets that each adds: not more of all of them
             parts.append((ErrorTerm("facets", max(error for error, _ in spread), SMALLER_TOLERANCE), spread[0][1]))
+        if self.edges is not None:
+            edges = EdgeEchoes(self.edges, view)
+            spreaders.append(edges)
         chosen = max(parts, key=lambda part: part[0].value)[1] if parts else {}
         model = {"model": "stop and go, single scattering"} if parts else {}
         words = {**model, **chosen, **(self.weights.describe(self.weight_error) if parts else {})}
         error_terms = *(term for term, _ in parts), *self.shadow_terms
+        if self.edges is not None:
+            words |= edges.describe()
+            error_terms = *error_terms, ErrorTerm("edges", self.edges.error, SMALLER_TOLERANCE)
         return ChannelEchoes(self, points, tuple(spreaders), error_terms, words)
 
     def check_seen(self, counts: Counts, near: float, far: float) -> None:
@@ -215,7 +224,7 @@ class ChannelEchoes:
 
     scene: SceneEchoes
     points: PointSpreader | None
-    spreaders: tuple[FacetSpreader | ExactFacets | FactorizedSpreader, ...]
+    spreaders: tuple[FacetSpreader | ExactFacets | FactorizedSpreader | EdgeEchoes, ...]
     error_terms: tuple[ErrorTerm, ...]
     plan: dict[str, Any]
 

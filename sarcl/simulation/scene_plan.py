@@ -28,6 +28,7 @@ NODES = 0.3  # share of a tolerance: largest error of gains interpolated over th
 # share of a tolerance for shadows on rough facets, where they are counted in samples: looks take most of the time. The
 # rest of the sum of squares is 0.6, which two taps of range profiles still meet at 1e-2
 SHADOWS = 0.8
+EDGES = 0.2  # share of a tolerance for edges: they are weaker than facets, which keep 0.98 of it
 CUT_PROFILES = 1.5  # error of range profiles of cut facets, over the least of 64 of them: sums are longer than that
 
 
@@ -105,9 +106,9 @@ def parts_of(scene: Scene) -> float:
 
 
 def share_of(request: EchoRequest, seen: SeenScene, tolerance: float) -> float:
-    """The share of a tolerance that points have, and facets, beside that of shadows that are counted in samples."""
-    left = np.sqrt(1 - SHADOWS**2) if samples_shadows(request, seen) else 1.0
-    return float(tolerance * left / parts_of(seen.scene))
+    """The share of a tolerance that points have, and facets, beside those of edges and of shadows in samples."""
+    others = SHADOWS**2 * samples_shadows(request, seen) + EDGES**2 * (request.crease is not None)
+    return float(tolerance * np.sqrt(1 - others) / parts_of(seen.scene))
 
 
 def samples_shadows(request: EchoRequest, seen: SeenScene) -> bool:

@@ -17,6 +17,7 @@ from ..scattering.scatterers import Points, facets_of, points_of
 from ..scattering.subdivision import Subdivision
 from ..scene.scene import Scene
 from .echo_request import EchoRequest
+from .edges.edge_echoes import PreparedEdges
 from .facets.facet_spreading import TiledFacets
 from .points.point_plan import PreparedPoints
 from .scene_echoes import SceneEchoes
@@ -101,6 +102,7 @@ def _prepared(plan: ScenePlan, *, tiled: bool, exact: bool) -> SceneEchoes:
         error_budget=plan.error_budget,
         shadow_terms=_shadow_terms(request, seen.scene, facets),
         n_pulses=len(seen.antennas),
+        edges=PreparedEdges.of(request, seen),
     )
     request.clock.lap("scene")
     prepared.check_plans(seen.antennas, plan.bands)

@@ -37,6 +37,8 @@ class EchoKeywords(TypedDict, total=False):
     """Options of `echo`, for functions that hand them on."""
 
     method: Literal["auto", "direct", "factorized"]
+    edges: bool
+    crease: float
     channels: Literal["simultaneous", "separated"]
     receive: Literal["reference", "own", "all"]
     skip: bool | Collection[EchoSkip]
@@ -174,6 +176,8 @@ def echo(
     track: Trajectory,
     *,
     method: Literal["auto", "direct", "factorized"] = "auto",
+    edges: bool = False,
+    crease: float = 0.35,
     channels: Literal["simultaneous", "separated"] = "simultaneous",
     receive: Literal["reference", "own", "all"] = "reference",
     skip: bool | Collection[EchoSkip] = True,
@@ -209,6 +213,8 @@ def echo(
     track: Trajectory,
     *,
     method: Literal["auto", "direct", "factorized"] = "auto",
+    edges: bool = False,
+    crease: float = 0.35,
     channels: Literal["simultaneous", "separated"] = "simultaneous",
     receive: Literal["reference", "own", "all"] = "reference",
     skip: bool | Collection[EchoSkip] = True,
@@ -244,6 +250,8 @@ def echo(
     track: list[Trajectory] | tuple[Trajectory, ...],
     *,
     method: Literal["auto", "direct", "factorized"] = "auto",
+    edges: bool = False,
+    crease: float = 0.35,
     channels: Literal["simultaneous", "separated"] = "simultaneous",
     receive: Literal["reference", "own", "all"] = "reference",
     skip: bool | Collection[EchoSkip] = True,

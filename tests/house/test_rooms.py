@@ -20,7 +20,6 @@ DOORS_FOR_OTHERS = {
     "sarcl.bench.fastsar_peer": "a program for another environment",
     "sarcl.bench.one_shot": "a program: python -m sarcl.bench.one_shot",
     "sarcl.papers.farooq.range_zones": "for users (docs: papers)",
-    "sarcl.visibility.rays": "for echoes by several bounces, which are to come",
 }
 
 

@@ -79,7 +79,12 @@ class ArrayChannels:
         """Channels interpolated from a few positions, where that is allowed, accurate and cheaper."""
         layout, scene = self.layout, self.seen.scene
         shared = not layout.rows.separated or layout.grid.holds([c.carrier for c in layout.sent])
-        if INTERPOLATED not in request.skips or layout.runs <= len(layout.rows.track) or not shared:
+        if (
+            request.crease is not None
+            or INTERPOLATED not in request.skips
+            or layout.runs <= len(layout.rows.track)
+            or not shared
+        ):
             return None
         channels = InterpolatedChannels(layout, scene, self.seen.weights, request.vertical, request.tolerance)
         faster = channels.is_faster(len(scene.positions) + len(scene.triangles))

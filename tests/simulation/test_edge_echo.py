@@ -1,0 +1,200 @@
+"""echo(edges=True): amplitudes, shadows on edges, tolerance, edges that are left out, bad input."""
+
+import numpy as np
+import pytest
+
+import sarcl
+from sarcl import Material, Scene, Trajectory, Waveform, shapes
+from sarcl.base.constants import SPEED_OF_LIGHT
+from sarcl.base.vectors import unit
+from sarcl.scattering.edge_diffraction import WedgeShape, edge_matrix
+from sarcl.scene.wedges import wedges
+
+CHIRP = Waveform.chirp(center=9.6e9, bandwidth=300e6, duration=1e-6)
+NEAR = {"reference": (0, 0, 0), "range_window": (-3, 3), "polarization": ("HH", "HV", "VV"), "check": False}
+
+
+def around(distance, n=4, incidence=0.9, azimuth=0.4, arc=0.02):
+    turn = azimuth + np.linspace(-arc / 2, arc / 2, n)
+    look = np.stack(
+        [np.sin(incidence) * np.cos(turn), np.sin(incidence) * np.sin(turn), np.full(n, np.cos(incidence))], axis=1
+    )
+    return Trajectory(np.arange(n) / 100, distance * look)
+
+
+def edges_alone(scene, track, *, tolerance=1e-3, **options):
+    """Samples of the edges, complex128 (n_pulses, 3, n), by difference; the report with them.
+
+    Edges have a fifth of the tolerance, facets the rest of the sum of squares: the same facets are added in both calls.
+    """
+    both = sarcl.echo(scene, CHIRP, track, edges=True, tolerance=tolerance, **NEAR, **options)
+    without = sarcl.echo(scene, CHIRP, track, tolerance=tolerance * np.sqrt(1 - 0.2**2), **NEAR, **options)
+    shape = len(track.positions), 3, both.n_samples
+    return (both.samples.astype(complex) - without.samples).reshape(shape), both
+
+
+def summed(scene, raw, track, receiver=None, seen=None, per_wave=20):
+    """Elements of a 20th of a wavelength, or as many as asked for, each a plane wave with the directions and the path
+    of its own, float64; and the norm of the edges at random phases. seen(places, antenna): where one sees them."""
+    edges = wedges(scene.triangles, scene.two_sided, 0.35)
+    frequencies = raw.frequency[0] + raw.frequency_step[0] * np.arange(raw.n_samples)
+    out, power = np.zeros((len(track.positions), 3, raw.n_samples), complex), 0.0
+    rx = track.positions if receiver is None else receiver.positions
+    for p, (to, back) in enumerate(zip(track.positions, rx, strict=True)):
+        reference = (np.linalg.norm(to) + np.linalg.norm(back)) / 2
+        for i in range(len(edges)):
+            start, way = edges.ends[i, 0], edges.ends[i, 1] - edges.ends[i, 0]
+            n = int(np.linalg.norm(way) * per_wave * 9.75e9 / SPEED_OF_LIGHT) + 1
+            places = start + (np.arange(n) + 0.5)[:, None] / n * way
+            looks = [unit(to - places)] * 2 if receiver is None else [unit(end - places) for end in (to, back)]
+            shape = WedgeShape(
+                np.tile(edges.inward[i], (n, 1)), np.tile(edges.normal[i], (n, 1)), np.full(n, edges.number[i])
+            )
+            matrix = edge_matrix(shape, *looks) * np.linalg.norm(way) / n
+            if seen is not None:
+                matrix *= (seen(places, to) & seen(places, back))[:, None, None]
+            path = np.linalg.norm(places - to, axis=1) + np.linalg.norm(places - back, axis=1) - 2 * reference
+            waves = 2 * np.pi * frequencies / SPEED_OF_LIGHT
+            turn = waves * ((looks[0] + looks[1]) @ way / n)[:, None]
+            wave = np.exp(-1j * waves * path[:, None]) * np.sinc(turn / (2 * np.pi))
+            one = np.einsum("krt,kn->rtn", matrix, wave)[[0, 0, 1], [0, 1, 1]]
+            out[p], power = out[p] + one, power + (np.abs(one) ** 2).sum()
+    return out, np.sqrt(power)
+
+
+SCENES = {
+    "plate": shapes.plate((0.9, 0.5)),
+    "box": shapes.box((0.6, 0.4, 0.3), rotation=(0.2, 0.5, -0.4)),
+    "wedge": shapes.plate((0.8, 0.8)) + shapes.plate((0.8, 0.8), rotation=(1.0, 0, 0), position=(0, 0.62, 0.34)),
+}
+
+
+def close(got, wanted, norm, tolerance, raw):
+    """Whether edges are those wanted, within their share of a tolerance and float32 of all samples."""
+    return np.linalg.norm(got - wanted) < 0.2 * tolerance * norm + 3e-7 * np.linalg.norm(raw.samples)
+
+
+@pytest.mark.parametrize(("distance", "tolerance"), [(12.0, 1e-1), (12.0, 1e-3), (2e5, 1e-3)])
+@pytest.mark.parametrize("name", SCENES)
+def test_edges_are_sums_over_their_elements_within_their_share_of_the_tolerance(name, distance, tolerance):
+    scene, track = SCENES[name], around(distance, n=2)
+    got, raw = edges_alone(scene, track, tolerance=tolerance, shadows=False)
+    wanted, norm = summed(scene, raw, track)
+    assert close(got, wanted, max(norm, np.linalg.norm(wanted)), tolerance, raw)
+    assert np.linalg.norm(wanted) > 1e-3 * np.linalg.norm(raw.samples)
+    assert raw.report.predicted_error <= tolerance
+
+
+def test_two_antennas():
+    scene, track = SCENES["box"], around(30.0, n=2)
+    receiver = around(40.0, n=2, incidence=0.5, azimuth=1.0)
+    got, raw = edges_alone(scene, track, receiver=receiver, tolerance=1e-3, shadows=False)
+    wanted, norm = summed(scene, raw, track, receiver)
+    assert close(got, wanted, norm, 1e-3, raw)
+
+
+@pytest.mark.parametrize("low", [None, 0.55])
+def test_shadows_end_where_they_fall_on_an_edge(low):
+    """A roof 1 m above a plate hides a part of its border, which follows from straight lines; the receiver too."""
+    plate, roof = shapes.plate((2.0, 1.2)), shapes.plate((0.83, 3.1), position=(0.7, 0.2, 1.0))
+    absorber = Scene.facets(roof.triangles, reflectivity=0.0)
+    track = around(2e5, n=2)
+    receiver = None if low is None else around(2e5, n=2, incidence=low, azimuth=0.9)
+    skips = {"range window", "facing away"}
+    got, raw = edges_alone(plate + absorber, track, receiver=receiver, tolerance=1e-3, skip=skips)
+
+    def seen(places, antenna):
+        ahead = antenna - places
+        at = (places + ahead / ahead[:, 2:])[:, :2] - [0.7, 0.2]
+        return (np.abs(at) > [0.83 / 2, 3.1 / 2]).any(axis=1)
+
+    wanted, norm = summed(plate, raw, track, receiver, seen, per_wave=400)
+    whole, _ = summed(plate, raw, track, receiver)
+    assert close(got, wanted, norm, 3e-2, raw)  # elements of the sum are seen whole or not at all: 1.5 mm
+    assert np.linalg.norm(whole - wanted) > 0.1 * norm
+
+
+def test_edges_behind_their_own_body_are_dark():
+    box = shapes.box((0.6, 0.4, 0.3))
+    report = sarcl.echo(box, CHIRP, around(1e4, n=2), edges=True, **NEAR).report
+    assert report.plan["edges"] == 12
+    pieces = report.plan["pieces of edges"]
+    assert 2 * pieces * 0.15 < report.contributions_skipped["facing away"]  # three of twelve, and facets
+    seen = report.contributions_done
+    hidden = sarcl.echo(box, CHIRP, around(1e4, n=2), edges=True, shadows=False, **NEAR).report.contributions_done
+    assert seen < hidden
+
+
+def test_edges_of_dielectrics_rough_and_creased_surfaces_are_left_out():
+    scene = shapes.box((0.6, 0.4, 0.3))
+    concrete = shapes.box((0.6, 0.4, 0.3), material="concrete")
+    rough = shapes.box((0.6, 0.4, 0.3), material=Material(height=2e-3))
+    track = around(1e4, n=2)
+    for other in (concrete, rough):  # of which one has no coherent part in HV: the same facets
+        got, raw = edges_alone(other, track)
+        assert raw.report.plan["edges"] == 0
+        assert not got.any()
+    material = ["metal"] * 10 + ["concrete"] * 2
+    mixed = Scene.facets(scene.triangles, material=material, two_sided=False)
+    plan = sarcl.echo(mixed, CHIRP, track, edges=True, **NEAR).report.plan
+    assert plan["edges"] + plan["edges left out"] == 12
+    assert plan["edges left out"] in (3, 4, 5)
+    cylinder = shapes.cylinder(0.3, 0.5)
+    assert sarcl.echo(cylinder, CHIRP, track, edges=True, crease=1.6, **NEAR).report.plan["edges"] == 0
+
+
+def test_reflectivity_weighs_edges():
+    track, options = around(1e4, n=2), {"shadows": False}
+    full, _ = edges_alone(shapes.plate((0.9, 0.5)), track, **options)
+    half, _ = edges_alone(Scene.facets(shapes.plate((0.9, 0.5)).triangles, reflectivity=0.5), track, **options)
+    assert np.linalg.norm(half - full / 2) < 1e-3 * np.linalg.norm(full)
+
+
+def test_the_check_includes_edges():
+    raw = sarcl.echo(SCENES["box"], CHIRP, around(50.0), edges=True, **{**NEAR, "check": True}, tolerance=1e-2)
+    assert 0 < raw.report.measured_error < 1e-2
+    edges = next(term for term in raw.report.error_terms if term.name == "edges")
+    assert edges.value <= 0.2e-2
+
+
+def test_channels_of_an_array_have_their_edges():
+    array = sarcl.AntennaArray.linear(3, spacing=0.5, frequency_step=0.0, axis=(0, 1, 0))
+    scene, track, tolerance = SCENES["box"], around(50.0, n=2), 1e-3
+    options = {**NEAR, "polarization": "HH", "channels": "separated", "shadows": False, "array": array}
+    raw = sarcl.echo(scene, CHIRP, track, edges=True, tolerance=tolerance, **options)
+    facets = sarcl.echo(scene, CHIRP, track, tolerance=tolerance * np.sqrt(1 - 0.2**2), skip=False, **options)
+    for channel in range(3):
+        rows = np.flatnonzero(raw.tx_channel == channel)
+        got = raw.samples[rows].astype(complex) - facets.samples[rows]
+        ends = [Trajectory(track.times, place[rows]) for place in (raw.tx, raw.rx)]
+        wanted, norm = summed(scene, raw, ends[0], ends[1])
+        assert np.linalg.norm(np.abs(got) - np.abs(wanted[:, 0])) < 2e-3 * norm
+
+
+def test_a_forecast_has_the_term_of_edges():
+    forecast = sarcl.plan(sarcl.echo, SCENES["box"], CHIRP, around(1e4), edges=True, tolerance=1e-2)
+    assert "edges" in [term.name for term in forecast.error_terms]
+    assert forecast.predicted_error <= 1e-2
+    raw = sarcl.echo(SCENES["box"], CHIRP, around(1e4), edges=True, tolerance=1e-2)
+    assert np.array_equal(forecast.run().samples, raw.samples)
+
+
+@pytest.mark.parametrize(
+    ("options", "kind", "words"),
+    [
+        ({"edges": "yes"}, TypeError, "edges"),
+        ({"edges": True, "crease": 0.0}, ValueError, "crease"),
+        ({"edges": True, "crease": -1.0}, ValueError, "crease"),
+        ({"edges": True, "crease": np.nan}, ValueError, "crease"),
+        ({"edges": True, "crease": 4.0}, ValueError, "crease"),
+    ],
+)
+def test_bad_input(options, kind, words):
+    with pytest.raises(kind, match=words):
+        sarcl.echo(SCENES["box"], CHIRP, around(1e4), **options)
+
+
+def test_other_verbs_refuse_edges_by_name():
+    for verb in (sarcl.spectral_echo, sarcl.fullwave_echo):
+        with pytest.raises(TypeError, match="edges"):
+            verb(SCENES["box"], CHIRP, around(1e4), edges=True)
