@@ -67,9 +67,9 @@ class EdgePieces:
         lit    where the part that both antennas see begins and ends, 0 to 1 along each piece (n, 2)
         waves  wave numbers 2 pi f/c, rad/m (m,)
 
-        a = L integral (F_0 + s (F_1 - F_0)) exp(j psi (s - 1/2)) ds over the lit part, where psi is k times the
-        difference of the paths over both ends: phases and amplitudes F meet from piece to piece, and errors of their
-        curvature are not added up along an edge.
+        a = F L integral exp(j psi (s - 1/2)) ds over the lit part, where psi is k times the difference of the paths
+        over both ends: phases meet from piece to piece, so that errors of their curvature are not added up along an
+        edge. F is that of the middle of the lit part, between both ends.
         """
         ends = [antennas.tx[pulse], antennas.rx[pulse]][: 1 if antennas.is_monostatic else 2]
         up = tuple(float(x) for x in vertical)
@@ -85,19 +85,10 @@ class EdgePieces:
         slope, center = np.subtract(end, begin), np.add(begin, end) / 2
         part, middle = lit[:, 1] - lit[:, 0], lit.sum(axis=1) / 2 - 0.5
         phase = waves * (2 * (paths[0] - paths[1])).astype(np.float64)[:, None]
-        half = phase * part[:, None] / 2
-        even, odd = np.sinc(half / np.pi), 0.5j * part[:, None] * _odd(half)
-        wave = (self.factor * self.lengths * part)[:, None] * np.exp(1j * phase * middle[:, None])
-        sums = (center + slope * middle)[..., None] * even + slope[..., None] * odd
+        line = (self.factor * self.lengths * part)[:, None] * np.sinc(phase * part[:, None] / (2 * np.pi))
+        sums = (center + slope * middle)[..., None] * line * np.exp(1j * phase * middle[:, None])
         reference = np.longdouble(antennas.reference_range[pulse])
-        return np.asarray((sums * wave).transpose(1, 0, 2)), (paths[0] + paths[1]) / 2 - reference
-
-
-def _odd(x: np.ndarray) -> np.ndarray:
-    """(sin x - x cos x)/x^2."""
-    small = np.abs(x) < 1e-2
-    safe = np.where(small, 1, x)
-    return np.where(small, x / 3 - x**3 / 30, (np.sin(safe) - safe * np.cos(safe)) / safe**2)
+        return np.asarray(sums.transpose(1, 0, 2)), (paths[0] + paths[1]) / 2 - reference
 
 
 def edge_pieces(scene: Scene, crease: float, longest: float) -> EdgePieces:
