@@ -92,7 +92,7 @@ def calls(section: str) -> dict[str, Call]:
     if section == "scene":
         from ..scene import shapes
 
-        known |= {shape.__name__: shape for shape in shapes.SHAPES}
+        known |= {shape.__name__: shape for shape in (*shapes.SHAPES, shapes.luneburg)}
     return known
 
 

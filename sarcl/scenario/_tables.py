@@ -147,7 +147,8 @@ def _material(value: Material) -> dict[str, Any]:
 def _scene(value: Scene) -> dict[str, Any]:
     tables: dict[str, Any] = {}
     if len(value.positions):
-        tables["points"] = [{"positions": value.positions, "amplitudes": value.amplitudes}]
+        apertures = {"apertures": value.apertures} if value.apertures.any() else {}
+        tables["points"] = [{"positions": value.positions, "amplitudes": value.amplitudes, **apertures}]
     if len(value.triangles):
         names = list(named(value))
         # one table a run of facets of one material: their order, and so their random heights, stays

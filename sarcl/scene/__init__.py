@@ -15,4 +15,5 @@ For this folder alone:
     _kept      results that follow from a scene alone, for later calls
     _solids    triangles of surfaces of revolution, prisms and geodesic spheres
     _tank      the parts of a tank
+    _target_rcs  radar cross sections of calibration targets in closed form
 """

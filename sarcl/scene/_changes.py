@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base import arguments, validation
+from ..base.constants import SPEED_OF_LIGHT
 from . import terrain
 from . import triangles as geometry
 
@@ -96,6 +97,19 @@ def _realized(scene: Scene, seed: int) -> Scene:
     moved = validation.sealed(scene.triangles + random * scene.point_roughness)
     heights = None if scene.heights is None else terrain.raised(scene.heights, scene.triangles, moved)
     return replace(scene, triangles=moved, point_roughness=no_displacements(len(moved)), heights=heights)
+
+
+def at_frequency(scene: Scene, frequency: float) -> Scene:
+    """The same echo at `frequency`, Hz, with `apertures` made part of the points' amplitudes.
+
+    Scenes without apertures are returned as they are. ValueError for a frequency that is not greater than 0.
+    """
+    frequency = validation.number("frequency", frequency, above=0)
+    if not scene.apertures.any():
+        return scene
+    areas = scene.apertures
+    factor = np.where(areas > 0, np.sqrt(4 * np.pi) * areas * frequency / SPEED_OF_LIGHT, 1.0)
+    return replace(scene, amplitudes=validation.sealed(scene.amplitudes * factor), apertures=np.zeros_like(areas))
 
 
 def part(scene: Scene, which: np.ndarray) -> Scene:

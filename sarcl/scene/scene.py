@@ -44,6 +44,9 @@ class Scene:
     materials        tuple of sarcl.Material, default a perfect conductor; their own reflectivity is moved into
                      `reflectivity`
     point_roughness  displacement of each corner by one standard deviation, m (k, 3, 3); `realized` applies it
+    apertures        m^2 (n,), of points that send back what falls on such an area, as a Luneburg lens does: `echo`
+                     multiplies their amplitudes by sqrt(4 pi) aperture/wavelength at the carrier (`at_frequency`);
+                     0 for other points, the default
     heights          (x, y, z) of the largest terrain of from_heights in the scene, if any: no antenna may stand
                      under it, and `echo` leaves it out as an occluder where all of it lies below every line of sight
     """
@@ -58,6 +61,7 @@ class Scene:
     materials: tuple[Material, ...] = ()
     point_roughness: NDArray[np.float64] = None  # type: ignore[assignment]
     heights: terrain.Heights | None = None
+    apertures: NDArray[np.float64] = None  # type: ignore[assignment]
 
     if TYPE_CHECKING:  # types of the arguments; the fields above have the types after conversion
 
@@ -73,6 +77,7 @@ class Scene:
             materials: Sequence[Material] = (),
             point_roughness: ArrayLike | None = None,
             heights: terrain.Heights | None = None,
+            apertures: ArrayLike | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -85,7 +90,10 @@ class Scene:
             object.__setattr__(self, "material", np.broadcast_to(np.int32(0), (k,)))
         if self.point_roughness is None:
             object.__setattr__(self, "point_roughness", _changes.no_displacements(k))
-        shapes = {"positions": (n, 3), "triangles": (k, 3, 3), "amplitudes": (n,), "point_roughness": (k, 3, 3)}
+        if self.apertures is None:
+            object.__setattr__(self, "apertures", np.broadcast_to(0.0, (n,)))
+        shapes: dict[str, tuple[int, ...]] = {"positions": (n, 3), "amplitudes": (n,), "apertures": (n,)}
+        shapes |= {"triangles": (k, 3, 3), "point_roughness": (k, 3, 3)}
         dtypes = {"amplitudes": np.complex128, "two_sided": np.bool_, "material": np.int32}
         for name in _ARRAYS:
             value, dtype = getattr(self, name), dtypes.get(name, np.float64)
@@ -102,20 +110,28 @@ class Scene:
         if (self.roughness < 0).any():
             row = int(np.argmin(self.roughness))
             raise ValueError(f"roughness[{row}] is {self.roughness[row]:g} m; a standard deviation cannot be negative")
+        if (self.apertures < 0).any():
+            row = int(np.argmin(self.apertures))
+            raise ValueError(f"apertures[{row}] is {self.apertures[row]:g} m^2; an area cannot be negative")
         table, factor = checked_table(self.materials, self.material)
         if factor is not None:
             object.__setattr__(self, "reflectivity", validation.sealed(self.reflectivity * factor))
         object.__setattr__(self, "materials", table)
 
     @classmethod
-    def points(cls, positions: ArrayLike, amplitudes: ArrayLike = 1.0) -> Scene:
-        """Point scatterers at `positions`, m (n, 3), of complex `amplitudes` (n,) or one for all."""
+    def points(cls, positions: ArrayLike, amplitudes: ArrayLike = 1.0, *, apertures: ArrayLike = 0.0) -> Scene:
+        """Point scatterers at `positions`, m (n, 3), of complex `amplitudes` (n,) or one for all.
+
+        apertures  m^2 (n,) or one for all: as in Scene, for points whose cross section grows with the frequency
+        """
         positions = validation.array("positions", positions, np.float64, ("n", 3))
         geometry.check_reach("positions", positions)
         if validation.ndim("amplitudes", amplitudes) == 0:
             amplitudes = [cast(complex, amplitudes)] * len(positions)
         amplitudes = validation.array("amplitudes", amplitudes, np.complex128, (len(positions),))
-        return cls(positions, amplitudes, np.zeros((0, 3, 3)), np.zeros(0), np.zeros(0), np.zeros(0, bool))
+        areas = validation.each("apertures", apertures, len(positions))
+        none = np.zeros(0)
+        return cls(positions, amplitudes, np.zeros((0, 3, 3)), none, none, np.zeros(0, bool), apertures=areas)
 
     @classmethod
     def facets(
@@ -333,6 +349,7 @@ class Scene:
 
     height_at, on, moved, on_earth = _changes.height_at, _changes.on, _changes.moved, _changes.on_earth
     realized, part, split = _changes.realized, _changes.part, _changes.split
+    at_frequency = _changes.at_frequency
 
     @cached_property
     def kept(self) -> Kept:
@@ -340,4 +357,4 @@ class Scene:
         return Kept()
 
 
-_ARRAYS = ("positions", "amplitudes", *_changes.FACET_ARRAYS)
+_ARRAYS = ("positions", "amplitudes", "apertures", *_changes.FACET_ARRAYS)

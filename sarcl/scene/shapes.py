@@ -1,9 +1,10 @@
 """Solids of exact dimensions as facets: ``from sarcl import shapes; ground + shapes.cone(3, 5).on(ground, 10, 0)``.
 
 They stand on z = 0 with their axis along z through the origin (a sphere is centred at the origin), and are then
-rotated and moved. All but `plate` and `disc` are closed and face outwards. Corners lie on the true surface, so curved
-solids are inscribed: n facets around the axis stay within 1 - cos(pi/n) of the radius. `tank` is made of several
-closed bodies, which overlap.
+rotated and moved. Corners lie on the true surface, so curved solids are inscribed: n facets around the axis stay
+within 1 - cos(pi/n) of the radius. `tank` is made of several closed bodies, which overlap. `plate`, `disc` and the
+calibration targets `trihedral`, `dihedral` and `top_hat` are thin sheets; all others are closed and face outwards.
+`luneburg` is a point. `trihedral_rcs` and the like are the targets' radar cross sections in closed form.
 
     edge        m, largest edge of a facet: with smaller ones, facets follow curved surfaces more closely
     sections    number of facets around the axis, default 72, or more where `edge` requires it
@@ -27,6 +28,11 @@ from . import _solids, _tank
 from . import triangles as geometry
 from .material import FacetMaterials, MaterialLike
 from .scene import Scene
+from ._target_rcs import FORMS, Form, check_brim
+from ._target_rcs import dihedral_rcs as dihedral_rcs
+from ._target_rcs import luneburg_rcs as luneburg_rcs
+from ._target_rcs import top_hat_rcs as top_hat_rcs
+from ._target_rcs import trihedral_rcs as trihedral_rcs
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
@@ -168,6 +174,71 @@ def tank(
     return _place(_tank.triangles(finest, sections) * stretch, edge, **options)
 
 
+def trihedral(
+    side: float,
+    *,
+    form: Form = "triangular",
+    edge: float | None = None,
+    two_sided: ArrayLike = True,
+    **options: Unpack[SurfaceOptions],
+) -> Scene:
+    """A corner of three plates at right angles: vertex at the origin, folds of length `side`, m, along x, y and z.
+
+    It opens along (1, 1, 1). form: of its plates, "triangular" (the corner of a cube cut off) or "square".
+    """
+    side, n = _length("side", side), 3 if validation.choice("form", form, FORMS) == "triangular" else 4
+    axes = side * np.eye(3)
+    outlines = [[0 * axes[i], axes[i], axes[i] + axes[i - 2], axes[i - 2]] for i in range(3)]
+    plates = np.array([[o[0], o[1], o[2]] if n == 4 else [o[0], o[1], o[3]] for o in outlines])
+    if n == 4:
+        plates = np.concatenate([plates, [[o[0], o[2], o[3]] for o in outlines]])
+    return _place(plates, edge, two_sided=two_sided, **options)
+
+
+def dihedral(
+    size: ArrayLike, *, edge: float | None = None, two_sided: ArrayLike = True, **options: Unpack[SurfaceOptions]
+) -> Scene:
+    """Two plates at a right angle, of size (across, along) the fold, m: x from 0 in z = 0, and z from 0 in x = 0.
+
+    The fold lies along y, its middle at the origin; it opens along (1, 0, 1).
+    """
+    across, along = _dimensions("size", size, 2)
+    ends = np.array([-along / 2, along / 2])
+    rows = [[(0.0, y, across), (0.0, y, 0.0), (across, y, 0.0)] for y in ends]
+    return _place(geometry.of_grid(np.array(rows)), edge, two_sided=two_sided, **options)
+
+
+def top_hat(
+    disc_radius: float,
+    cylinder_radius: float,
+    height: float,
+    *,
+    edge: float | None = None,
+    sections: int | None = None,
+    two_sided: ArrayLike = True,
+    **options: Unpack[SurfaceOptions],
+) -> Scene:
+    """An upright cylinder with its lid on a disc about the origin: a dihedral from all sides."""
+    disc, radius = _length("disc_radius", disc_radius), _length("cylinder_radius", cylinder_radius)
+    height = _length("height", height)
+    check_brim(disc, radius)
+    profile = [(disc, 0.0), (radius, 0.0), (radius, height), (0.0, height)]
+    return _revolve(profile, edge, sections, two_sided=two_sided, **options)
+
+
+def luneburg(radius: float, *, position: ArrayLike = (0.0, 0.0, 0.0)) -> Scene:
+    """The echo of a Luneburg lens of `radius`, m, with a reflector: one point at `position`, m (3,), no facets.
+
+    The point has the lens's radar cross section at the carrier, `luneburg_rcs`, in HH and VV, from all directions: a
+    real lens serves those for which its reflector lies behind it. The path through the lens, of index
+    sqrt(2 - (r/radius)^2), is longer than in air: a real lens appears pi/2 radius behind its centre, seen from the
+    radar. `position` is where it appears.
+    """
+    area = np.pi * _length("radius", radius) ** 2
+    position = validation.array("position", position, np.float64, (3,))
+    return Scene.points([position], apertures=area)
+
+
 def _revolve(
     profile: Sequence[tuple[float, float]], edge: float | None, sections: int | None, **options: Unpack[ClosedOptions]
 ) -> Scene:
@@ -204,7 +275,7 @@ def _dimensions(name: str, size: ArrayLike, n: int) -> list[float]:
     return [validation.number(f"{name}[{i}]", v, above=0) for i, v in enumerate(size)]
 
 
-SHAPES = (plate, disc, box, cylinder, cone, frustum, sphere, tank)
+SHAPES = (plate, disc, box, cylinder, cone, frustum, sphere, tank, trihedral, dihedral, top_hat)
 
 
 def _spell_out(shape: Callable[..., Scene]) -> None:

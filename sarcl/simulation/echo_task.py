@@ -63,7 +63,8 @@ def echo_task(scene: Scene, waveform: Waveform, track: Trajectory, options: Echo
     point = scene.center if options.reference is None else np.asarray(options.reference)
     sends, hears, motion = echo_sampling.in_flight(track, options.receiver, scene, point)
     echo_sampling.receiver_positions(sends, hears)
-    real = scene.realized(request.seed)  # before the range window: it moves the corners of rough terrain
+    # before the range window: rough terrain moves its corners
+    real = scene.realized(request.seed).at_frequency(waveform.center)
     weights = antenna_weights.weights_of(options.antenna, options.radar, sends, hears, waveform, real.center)
     return EchoTask(
         options=options,

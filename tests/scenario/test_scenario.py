@@ -114,6 +114,7 @@ ANTENNAS = {name: getattr(sarcl.Antenna, name) for name in ("isotropic", "rectan
 ARRAYS = {name: getattr(sarcl.AntennaArray, name) for name in ("linear", "planar", "costas")}
 GRIDS = {name: getattr(sarcl.ImageGrid, name) for name in ("plane", "points", "on_terrain", "zero_doppler")}
 SHAPES = {name: getattr(sarcl.shapes, name) for name in "plate disc box cylinder cone frustum sphere tank".split()}
+SHAPES |= {name: getattr(sarcl.shapes, name) for name in "trihedral dihedral top_hat luneburg".split()}
 SCENES = {name: getattr(sarcl.Scene, name) for name in ("points", "from_mesh", "from_heights", "from_dem", "facets")}
 VERBS = {verb: {"": getattr(sarcl, verb)} for verb in ("echo", "spectral_echo", "fullwave_echo", "backproject")}
 VERBS |= {verb: {"": getattr(sarcl, verb)} for verb in ("polar_format", "range_doppler")}

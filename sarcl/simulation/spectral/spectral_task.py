@@ -75,7 +75,7 @@ def spectral_task(
     point = scene.center if options.reference is None else np.asarray(options.reference)
     _, _, motion = echo_sampling.in_flight(track, None, scene, point)
     reference_range = echo_sampling.half_path(tx, tx, point)
-    real = scene.realized(request.seed)
+    real = scene.realized(request.seed).at_frequency(waveform.center)
     weights = antenna_weights.weights_of(options.antenna, options.radar, track, None, waveform, real.center)
     near, far = echo_sampling.window(real, waveform, tx, tx, reference_range, options.range_window)
     frequency, step, n_samples = echo_sampling.sampling(waveform, near, far, options.compressed)
