@@ -53,6 +53,7 @@ from .verbs import fullwave_echo as fullwave_echo
 from .verbs import plan as plan
 from .verbs import polar_format as polar_format
 from .verbs import range_doppler as range_doppler
+from .verbs import rcs as rcs
 from .verbs import spectral_echo as spectral_echo
 from .visibility import illumination as illumination
 

@@ -354,7 +354,7 @@ def flags(entries: list[Verb]) -> str:
 
 def made(root: Path) -> dict[Path, str]:
     """The files as they should be now: path -> text."""
-    entries = [read(name) for name in verbs.HOMES]
+    entries = [read(name) for name in (*verbs.HOMES, *verbs.NUMBERS)]
     return {root / STUB: stub(entries), root / PAGE: page(entries), root / FLAGS: flags(entries)}
 
 

@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Any
 from .text import tolerance_text
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from ..model.image import Image
     from ..model.phase_history import PhaseHistory
 
@@ -66,7 +68,7 @@ class ToleranceMissed(ValueError):
     """The check of a finished image, or of finished echoes, measured an error above the tolerance.
 
     tolerance, measured  relative errors; measured is NaN where values of the result are not finite numbers
-    image, raw           the finished Image or PhaseHistory, the other is None
+    image, raw, values   the finished Image or PhaseHistory, or numbers of `rcs`; the others are None
     raws                 of a list of tracks the finished PhaseHistories of all
     predicted            relative error that the error formulas predicted, None: unknown
     instead              what to do where a smaller tolerance may not help
@@ -80,8 +82,11 @@ class ToleranceMissed(ValueError):
         raw: PhaseHistory | None = None,
         predicted: float | None = None,
         instead: str = "",
+        values: np.ndarray | None = None,
     ) -> None:
         kept = "the image is kept: in its file, or in this error's .image"
+        if values is not None:
+            kept = "the numbers are kept in this error's .values"
         if raw is not None:
             kept = "the echoes are kept: in their file, or in this error's .raw"
         if not math.isfinite(measured):
@@ -95,6 +100,7 @@ class ToleranceMissed(ValueError):
         advice = ", and ".join([*filter(None, remedies), "please report it"])
         super().__init__(f"tolerance {tolerance:.1e} was missed, {measured:.1e} measured: {cause}; {advice} ({kept})")
         self.tolerance, self.measured, self.image, self.raw = tolerance, measured, image, raw
+        self.values = values
         self.raws: list[PhaseHistory] = []
 
 

@@ -26,13 +26,13 @@ from numpy.typing import ArrayLike
 from ..base import validation
 from . import _solids, _tank
 from . import triangles as geometry
-from .material import FacetMaterials, MaterialLike
-from .scene import Scene
 from ._target_rcs import FORMS, Form, check_brim
 from ._target_rcs import dihedral_rcs as dihedral_rcs
 from ._target_rcs import luneburg_rcs as luneburg_rcs
 from ._target_rcs import top_hat_rcs as top_hat_rcs
 from ._target_rcs import trihedral_rcs as trihedral_rcs
+from .material import FacetMaterials, MaterialLike
+from .scene import Scene
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation

@@ -22,6 +22,7 @@ For other folders:
     facets/            echoes of facets, directly or factorised
     factorized/        scatterers spread about small cells at few antenna positions, and cells joined level by level
     points/            echoes of points, directly or factorised
+    rcs/               rcs(): radar cross sections in directions
     spectral/          spectral_echo(): echoes of straight tracks by Fourier transforms
     tracks/            echoes of several tracks over one scene
 

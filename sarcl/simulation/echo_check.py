@@ -117,7 +117,9 @@ def _exact(part: Points | FacetSet, view: ChannelView, p: int) -> tuple[np.ndarr
     """Samples (n_polarizations, n) of pulse p at the frequencies, and their power at random phases."""
     antennas, frequencies, polarizations = view.antennas, view.frequencies, view.polarizations
     if isinstance(part, FacetSet):
-        return facet_samples(part, view, p, inside_window(part, antennas, p), _light(part, antennas, p, frequencies))
+        return facet_samples(
+            part, view, p, inside_window(part, antennas, p), exact_light(part, antennas, p, frequencies)
+        )
     from ..reference.equations import point_echo as exact_echo
 
     tx, rx, places = antennas.tx[p], antennas.rx[p], part.positions
@@ -137,7 +139,7 @@ def _exact(part: Points | FacetSet, view: ChannelView, p: int) -> tuple[np.ndarr
     return values, powers
 
 
-def _light(part: FacetSet, antennas: PulseGeometry, pulse: int, frequencies: np.ndarray) -> Light:
+def exact_light(part: FacetSet, antennas: PulseGeometry, pulse: int, frequencies: np.ndarray) -> Light:
     """What a pulse sees of the partly lit facets, by the reference."""
     from ..reference.lit_part import lit_part
 
@@ -149,4 +151,4 @@ def _light(part: FacetSet, antennas: PulseGeometry, pulse: int, frequencies: np.
     for i, k in enumerate(index.tolist()):
         occluders = part.lit_parts.occluders_at(pulse, int(part.lit_rows[k]))
         share[0, i], mean[0, i] = lit_part(part.triangles[k], occluders, ends, waves, part.lit_parts.on_plane)
-    return Light(index, share, mean)
+    return Light(index, np.maximum(share, 0), mean)

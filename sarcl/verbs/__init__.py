@@ -1,4 +1,4 @@
-"""The verbs: from a scene to echoes, from echoes to an image; and plan(), which forecasts any of them.
+"""The verbs: from a scene to echoes or cross sections, from echoes to an image; and plan(), which forecasts them.
 
 A verb is imported from its room when it is first used: an image needs none of the rooms that make echoes. Types of
 their arguments for type checkers and editors: __init__.pyi, which docs/developers/write_options.py makes of the verbs'
@@ -24,13 +24,16 @@ HOMES = {
     "polar_format": "imaging.polar_format.polar_format",
     "range_doppler": "imaging.range_doppler.range_doppler",
 }
-__all__ = ["backproject", "echo", "fullwave_echo", "plan", "polar_format", "range_doppler", "spectral_echo"]
+# a verb that returns plain numbers, without a report -> the file that defines it
+NUMBERS = {"rcs": "simulation.rcs.rcs"}
+__all__ = ["backproject", "echo", "fullwave_echo", "plan", "polar_format", "range_doppler", "rcs", "spectral_echo"]
 
 
 def __getattr__(name: str) -> Any:
-    if name not in HOMES:
+    homes = HOMES | NUMBERS
+    if name not in homes:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}; it has {', '.join(__all__)}")
-    verb = getattr(import_module(f"..{HOMES[name]}", __name__), name)
+    verb = getattr(import_module(f"..{homes[name]}", __name__), name)
     globals()[name] = verb
     return verb
 
@@ -50,9 +53,8 @@ def plan(*args: Any, **options: Any) -> Forecast[Any]:
     verb, subjects = (__getattr__("backproject"), args) if is_short else (args[0], args[1:])
     planned = getattr(verb, "planned", None)
     if planned is None:
-        raise TypeError(
-            f"plan was given {verb!r:.60}, which is no verb; give one of {', '.join(HOMES)}, such as sarcl.echo"
-        )
+        known = ", ".join((*HOMES, *NUMBERS))
+        raise TypeError(f"plan was given {verb!r:.60}, which is no verb; give one of {known}, such as sarcl.echo")
     forecast: Forecast[Any] = planned(*subjects, **options).forecast()
     echoes = [value for value in (*subjects, *options.values()) if isinstance(value, PhaseHistory)]
     stamps = [file_stamps(raw.samples) for raw in echoes]

@@ -4,6 +4,7 @@ from collections.abc import Callable, Collection, Sequence
 from typing import Literal, ParamSpec, TypedDict, TypeVar, overload
 
 import distributed
+import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.map_aperture import MapApertureOptions, MapKind
@@ -166,6 +167,18 @@ class RangeDopplerKeywords(TypedDict, total=False):
     window: Window | None
     weights: ArrayLike | None
     out: PathLike | None
+    device: DeviceChoice | None
+    progress: Progress | None
+
+class RcsKeywords(TypedDict, total=False):
+    """Options of `rcs`, for functions that hand them on."""
+
+    receiver: tuple[ArrayLike, ArrayLike] | None
+    polarization: Polarization | Literal["all"] | Sequence[Polarization]
+    shadows: bool
+    check: bool | None
+    tolerance: float
+    max_bytes: float | None
     device: DeviceChoice | None
     progress: Progress | None
 
@@ -496,6 +509,24 @@ def range_doppler(
 ) -> Image:
     """Focus echoes of a near-straight, evenly sampled track on a grid of zero-Doppler times and slant ranges.
     Options: docs/guide/options.md."""
+
+def rcs(
+    scene: Scene,
+    azimuth: ArrayLike,
+    elevation: ArrayLike,
+    frequency: ArrayLike,
+    *,
+    receiver: tuple[ArrayLike, ArrayLike] | None = None,
+    polarization: Polarization | Literal["all"] | Sequence[Polarization] = "HH",
+    shadows: bool = True,
+    check: bool | None = None,
+    tolerance: float = 0.001,
+    max_bytes: float | None = None,
+    device: DeviceChoice | None = None,
+    progress: Progress | None = None,
+) -> np.ndarray:
+    """Scattering amplitudes s of a scene for plane waves: |s|^2 is the radar cross section, m^2. Options:
+    docs/guide/options.md."""
 
 @overload
 def plan(verb: Callable[_P, _R], /, *args: _P.args, **options: _P.kwargs) -> Forecast[_R]:

@@ -31,6 +31,7 @@ VERBS = {
     "plan, echo": lambda t: sarcl.plan(sarcl.echo, POINT, CHIRP, TRACK, tolerance=t),
     "spectral_echo": lambda t: sarcl.spectral_echo(POINT, CHIRP, TRACK, tolerance=t),
     "fullwave_echo": lambda t: sarcl.fullwave_echo(BODY, CHIRP, TRACK, tolerance=t),
+    "rcs": lambda t: sarcl.rcs(BODY, 0.0, 0.0, 1e10, tolerance=t),
     "beam": lambda t: sarcl.beam(sarcl.AntennaArray.linear(3, spacing=0.015), 1e10, **TOWARDS, tolerance=t),
 }
 

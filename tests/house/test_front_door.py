@@ -58,7 +58,7 @@ def test_all_of_the_contract_is_there():
         "Waveform Trajectory Scene Material Antenna AntennaArray Radar PhaseHistory ImageGrid Image Report Scenario "
         "echo beam ambiguity compress map_aperture backproject polar_format autofocus measure read concatenate devices "
         "plan Forecast PointResponse Ambiguity add_noise NoDeviceError SarclWarning "
-        "ToleranceMissed ToleranceUnreachable Orbit ElevationModel spectral_echo range_doppler "
+        "ToleranceMissed ToleranceUnreachable Orbit ElevationModel spectral_echo range_doppler rcs "
         "doppler_centroid effective_velocity EffectiveVelocity fullwave_echo"
     ).split()
     assert set(sarcl.__all__) == {*wanted, *MODULES}

@@ -25,6 +25,8 @@ from sarcl.model.image import Image
 from sarcl.model.image_grid import ImageGrid
 from sarcl.model.phase_history import PhaseHistory
 
+ALL = (*verbs.HOMES, *verbs.NUMBERS)
+
 ROOT = Path(__file__).parents[2]
 FLAGS = ROOT / "sarcl" / "cli" / "_flags.py"
 SCRIPT = ROOT / "docs" / "developers" / "write_options.py"
@@ -94,7 +96,7 @@ def test_a_default_that_is_no_literal_is_refused(write, monkeypatch):
         write.made(ROOT)
 
 
-@pytest.mark.parametrize("name", verbs.HOMES)
+@pytest.mark.parametrize("name", ALL)
 def test_the_signature_of_the_stub_is_that_of_the_verb(name):
     """Where it has several signatures, the first is for results that are whole, one says what a piece is, and the last
     is for lists."""
@@ -121,7 +123,7 @@ def test_the_signature_of_the_stub_is_that_of_the_verb(name):
     assert list(parameters.items()) == list(wanted.parameters.items())
 
 
-@pytest.mark.parametrize("name", verbs.HOMES)
+@pytest.mark.parametrize("name", ALL)
 def test_keywords_of_the_stub_are_the_options_of_the_verb(name):
     names, signatures = stub()
     keywords = typing.get_type_hints(names[f"{name.title().replace('_', '')}Keywords"], names)
@@ -162,8 +164,8 @@ def test_flags_come_without_numpy():
 def test_every_option_stands_on_the_page(write):
     page = (ROOT / write.PAGE).read_text()
     shared, *sections = page.partition("## Every verb")[2].split("\n## ")
-    assert [section.partition("\n")[0] for section in sections] == list(verbs.HOMES)
-    for name, section in zip(verbs.HOMES, sections, strict=True):
+    assert [section.partition("\n")[0] for section in sections] == list(ALL)
+    for name, section in zip(ALL, sections, strict=True):
         for option_name in described(getattr(verbs, name).options):
             assert f"| `{option_name}` |" in section or f"| `{option_name}` |" in shared
 
@@ -176,5 +178,5 @@ def test_names_that_two_verbs_mean_differently_are_told_apart():
 
 
 def test_functions_of_the_stub_are_those_of_the_package():
-    assert set(stub()[1]) == {*verbs.HOMES, "plan"} == set(verbs.__all__)
+    assert set(stub()[1]) == {*ALL, "plan"} == set(verbs.__all__)
     assert all(getattr(verbs, name).__name__ == name for name in verbs.__all__)
