@@ -16,6 +16,8 @@
 //           corners   of a shadow: 0 where it misses the facet, COVERS where it covers all of it
 // macros    ENDS      antennas: 1 monostatic, 2 a transmitter and a receiver
 //           WAVES     wavenumbers of a launch, 0 to 8
+//           FORWARD   1: the second antenna looks at a facet from any side, and occluders whose pairs have the number
+//                     ~occluder (of the facet's own body) cast no shadow from it
 //           PARTS     covered parts of an edge that are listed at once: few on GPUs, so that they stay in registers
 // numbers   float64 throughout: float32 cannot place points at `slack`, 1e-12 of a facet's edge, beside an edge
 // reference: sarcl/reference/lit_part.py:lit_part
@@ -86,12 +88,14 @@ __kernel void cast_shadows(cast_shadows_numbers given, __global const double *re
                            __global double *restrict shadows, __global uchar *restrict corners) {
     size_t pair = get_global_id(0), end = get_global_id(1), at = end * given.n_pairs + pair;
     __global const double *r = receivers + RECEIVER * (size_t)pair_receiver[pair];
-    __global const double *occluder = occluders + 9 * (size_t)pair_occluder[pair];
+    int number = pair_occluder[pair], is_own = FORWARD && number < 0, is_forward = FORWARD && (end & 1);
+    __global const double *occluder = occluders + 9 * (size_t)(is_own ? ~number : number);
     corners[at] = 0;
+    if (is_own && is_forward) return;
     __global const double *antenna = antennas + 3 * end;
     double dx = antenna[0] - r[0], dy = antenna[1] - r[1], dz = antenna[2] - r[2];
     double distance = sqrt(dx * dx + dy * dy + dz * dz), above = dx * r[9] + dy * r[10] + dz * r[11], both = above / distance;
-#if ENDS == 2
+#if ENDS == 2 && !FORWARD
     __global const double *other = antennas + 3 * (end ^ 1);
     double ox = other[0] - r[0], oy = other[1] - r[1], oz = other[2] - r[2];
     both += (ox * r[9] + oy * r[10] + oz * r[11]) / sqrt(ox * ox + oy * oy + oz * oz);

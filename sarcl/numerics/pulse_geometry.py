@@ -35,6 +35,7 @@ class PulseGeometry:
     wrap             range profiles repeat beyond the window
     beam             unit vectors (n, 3), and beam_angle, rad: only points within half the angle of a pulse's
                      direction, as its transmitter sees them, contribute to it; None: all do
+    forward          the receiver sees what the transmitter lights from all sides (forward scatter of facets)
     runs             (first, stop) of each run of consecutive pulses along which the antennas move smoothly, where known
     """
 
@@ -49,10 +50,13 @@ class PulseGeometry:
     beam: np.ndarray | None = None
     beam_angle: float = 2 * np.pi
     runs: tuple[tuple[int, int], ...] = ()
+    forward: bool = False
 
     def __post_init__(self) -> None:
         if self.rx is not self.tx and np.array_equal(self.rx, self.tx):
             object.__setattr__(self, "rx", self.tx)
+        if self.rx is self.tx:
+            object.__setattr__(self, "forward", False)
         for name in PER_PULSE:
             object.__setattr__(self, name, np.broadcast_to(getattr(self, name), len(self.tx)))
 

@@ -80,20 +80,29 @@ def _halves(piece: np.ndarray, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray
 
 
 def lit_part(
-    facet: np.ndarray, occluders: np.ndarray, antennas: list[np.ndarray], waves: np.ndarray, on_plane: float = 1e-9
+    facet: np.ndarray,
+    occluders: np.ndarray,
+    antennas: list[np.ndarray],
+    waves: np.ndarray,
+    on_plane: float = 1e-9,
+    others: np.ndarray | None = None,
 ) -> tuple[float, np.ndarray]:
     """Share of a facet, m (3, 3), that one antenna or two, m (3,), see past occluders, m (k, 3, 3), and the mean over
     the whole facet of exp(j k (u_t + u_r).rho) on that part, rho from the centroid, at wavenumbers k, rad/m: (m,).
 
-    An antenna that is edge-on to the facet, or behind the side that both look at, casts no shadow."""
+    An antenna that is edge-on to the facet, or behind the side that both look at, casts no shadow. Of forward scatter,
+    `others`, bool (k,), are occluders of other bodies: these alone cast shadows from the second antenna, which looks at
+    the facet from any side."""
     up = plane_axes(facet)[2]
     sines = [float(unit(antenna - facet.mean(axis=0)) @ up) for antenna in antennas]
     side = -1.0 if sum(sines) < 0 else 1.0
+    forward = others is not None and len(antennas) == 2
+    casters = [occluders, occluders[others] if forward else occluders]
     shadows = [
         shadow(facet, other, antenna, on_plane)
-        for antenna, sine in zip(antennas, sines, strict=True)
-        if side * sine > 1e-6
-        for other in occluders
+        for antenna, sine, solid in zip(antennas, sines, casters[: len(antennas)], strict=True)
+        if (abs(sine) if forward else side * sine) > 1e-6
+        for other in solid
     ]
     pieces = lit_pieces(facet, [s for s in shadows if len(s) and area(s) > 0])
     center = facet.mean(axis=0)

@@ -65,7 +65,7 @@ class CuttingError:
         if self._every and len(some):
             self._plane = coplanar_groups(scene, some, facet_kinds.random(scene)[some])
             self._waves = lobe_wavenumbers(view.center, view.bandwidth, self._triangles, self._plane)
-        self._columns = view.columns
+        self._columns, self._forward = view.columns, antennas.forward
         self._vertical = vertical[0], vertical[1], vertical[2]
         eps = np.array([m.permittivity(view.highest) for m in scene.materials], np.complex128)
         self._permittivity, self._reflectivity = eps[scene.material[some]], scene.reflectivity[some]
@@ -136,7 +136,8 @@ class CuttingError:
         n, two_sided = (np.repeat(a, 3, axis=0) for a in (normals_and_areas(self._triangles)[0], self._two_sided))
         for ends in self._ends:
             looks = [unit(end - corners) for end in ends]
-            seen = lit_share(np.where((two_sided & turned(n, *looks))[:, None], -n, n), *looks) > 0
+            is_back = two_sided & turned(n, looks[0], looks[1], self._forward)
+            seen = lit_share(np.where(is_back[:, None], -n, n), looks[0], looks[1], self._forward) > 0
             q = looks[0] + looks[1]
             across = np.linalg.norm(q - n * (n * q).sum(axis=1)[:, None], axis=1)
             most = max(most, float(across[seen].max(initial=0.0)))
@@ -175,9 +176,9 @@ class CuttingError:
         places = centroids(triangles)
         to_tx, to_rx = (unit(end - places) for end in ends)
         normals = normals_and_areas(triangles)[0]
-        behind = self._two_sided[of] & turned(normals, to_tx, to_rx)
+        behind = self._two_sided[of] & turned(normals, to_tx, to_rx, self._forward)
         normals = np.where(behind[:, None], -normals, normals)
-        matrix = scattering_matrix(normals, to_tx, to_rx, self._permittivity[of], self._vertical)
+        matrix = scattering_matrix(normals, to_tx, to_rx, self._permittivity[of], self._vertical, self._forward)
         return matrix.reshape(-1, 4)[:, self._columns] * self._reflectivity[of, None], to_tx + to_rx
 
     @property

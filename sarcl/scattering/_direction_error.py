@@ -40,7 +40,7 @@ class DirectionError:
     def __init__(self, view: FacetView) -> None:
         scene, mirror, antennas, vertical = view.scene, view.mirror, view.antennas, view.vertical
         self._vertical = (float(vertical[0]), float(vertical[1]), float(vertical[2]))
-        self._columns = view.columns
+        self._columns, self._forward = view.columns, antennas.forward
         eps = np.array([m.permittivity(view.highest) for m in scene.materials], np.complex128)
         self._triangles, self._two_sided = scene.triangles, scene.two_sided
         self._permittivity, self._reflectivity = eps[scene.material], scene.reflectivity
@@ -71,7 +71,9 @@ class DirectionError:
         normals, places = normals_and_areas(triangles)[0], centroids(triangles)
         for ends in looks:
             to_tx, to_rx = (unit(end - places) for end in ends)
-            n = np.where((self._two_sided[some] & turned(normals, to_tx, to_rx))[:, None], -normals, normals)
+            n = np.where(
+                (self._two_sided[some] & turned(normals, to_tx, to_rx, self._forward))[:, None], -normals, normals
+            )
             exact = self._matrix(n, to_tx, to_rx, some)
             right += float(share @ (np.abs(exact) ** 2).sum(axis=1))
             for look in (to_tx,) if ends[0] is ends[1] or np.array_equal(*ends) else (to_tx, to_rx):
@@ -81,14 +83,15 @@ class DirectionError:
 
     def _matrix(self, normals: np.ndarray, to_tx: np.ndarray, to_rx: np.ndarray, some: np.ndarray) -> np.ndarray:
         """S of facets `some`, complex128 (n, 4)."""
-        return scattering_matrix(normals, to_tx, to_rx, self._permittivity[some], self._vertical).reshape(-1, 4)
+        eps = self._permittivity[some]
+        return scattering_matrix(normals, to_tx, to_rx, eps, self._vertical, self._forward).reshape(-1, 4)
 
     def _turn(self, some: np.ndarray, share: np.ndarray, ends: Ends, edge: float) -> tuple[float, float]:
         pieces, of = self._graded(self._triangles[some], ends, edge)
         weight, middle = share[of] * areas(pieces) * self._reflectivity[some[of]] ** 2, centroids(pieces)
         to_tx, to_rx = (unit(end - middle) for end in ends)
         n = normals_and_areas(pieces)[0]
-        n = np.where((self._two_sided[some[of]] & turned(n, to_tx, to_rx))[:, None], -n, n)
+        n = np.where((self._two_sided[some[of]] & turned(n, to_tx, to_rx, self._forward))[:, None], -n, n)
         exact = self._matrix(n, to_tx, to_rx, some[of]).reshape(-1, 2, 2)
         right = float(weight @ (np.abs(exact.reshape(-1, 4)[:, self._columns]) ** 2).sum(axis=1))
         shrink = np.minimum(1.0, edge / np.maximum.reduce(edges(pieces)))[:, None]

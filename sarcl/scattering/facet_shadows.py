@@ -66,8 +66,16 @@ def lit_parts_of(
     """Lit parts of the pieces `wanted` (k,), which the facets that they are parts of occlude."""
     scene, given = pieces.scene, pieces.original.triangles
     facets = FacetPieces(scene.triangles, scene.two_sided, wanted, given, pieces.of)
-    options = {"max_bytes": rule.max_bytes, "margin": rule.margin}
-    return LitParts(device, facets, given, antennas.ends, progress=progress, **options)
+    return LitParts(
+        device,
+        facets,
+        given,
+        antennas.ends,
+        max_bytes=rule.max_bytes,
+        margin=rule.margin,
+        forward=antennas.forward,
+        progress=progress,
+    )
 
 
 def illumination_of(

@@ -49,6 +49,7 @@ class FacetSet:
     lit_rows      number of each facet among the partly lit ones, -1 where every pulse sees it whole (k,)
     sampled       facets that the illumination is of; the others count whole in it (k,); None: all
     incoherent    rough facets whose coherent part others of the set carry (k,); None: none
+    forward       what the transmitter lights radiates to a receiver behind it as well, where that is another antenna
     """
 
     triangles: np.ndarray
@@ -63,6 +64,7 @@ class FacetSet:
     lit_rows: np.ndarray | None = None
     sampled: np.ndarray | None = None
     incoherent: np.ndarray | None = None
+    forward: bool = False
 
     def __len__(self) -> int:
         return len(self.triangles)
@@ -143,6 +145,7 @@ class FacetSet:
             self.random[which] if len(self.random) else self.random, lit_parts, lit_rows,
             None if self.sampled is None else self.sampled[which],
             None if self.incoherent is None else self.incoherent[which],
+            self.forward,
         )  # fmt: skip
 
     def light(self, first: int, ends: list[np.ndarray], waves: np.ndarray) -> Light:
@@ -221,12 +224,12 @@ class FacetSet:
 
         places = centroids(self.triangles)
         to_tx, to_rx = (unit(end - places) for end in (tx, rx))
-        behind = self.two_sided & turned(normals(self.triangles), to_tx, to_rx)
+        behind = self.two_sided & turned(normals(self.triangles), to_tx, to_rx, self.forward)
         triangles = np.where(behind[:, None, None], self.triangles[:, ::-1], self.triangles)
         facing, areas = normals_and_areas(triangles)
         both = to_tx + to_rx
         phases = (triangles[:, 1:] - triangles[:, :1]) @ both[:, :, None]
-        cosine, parts = scattering_parts(facing, to_tx, to_rx, tuple(vertical.tolist()))
+        cosine, parts = scattering_parts(facing, to_tx, to_rx, tuple(vertical.tolist()), self.forward)
         some = [("HV".index(name[0]), "HV".index(name[1])) for name in polarizations]
         parts = np.stack([parts[..., i, j] for i, j in some], axis=-1)
         n, k = len(frequencies), len(self)

@@ -108,7 +108,7 @@ def polarisation(sight: np.ndarray, up: tuple[float, float, float] = UP) -> tupl
     return h, cross(h, s)
 
 
-def lit_share(normal: np.ndarray, to_tx: np.ndarray, to_rx: np.ndarray) -> np.ndarray:
+def lit_share(normal: np.ndarray, to_tx: np.ndarray, to_rx: np.ndarray, forward: bool = False) -> np.ndarray:
     """Share (...) of the physical-optics echo that a facet sends back: 1 in front of both antennas, 0 behind either.
 
     normal, to_tx, to_rx  unit vectors (..., 3), the last two from the facet to the antennas
@@ -121,17 +121,19 @@ def lit_share(normal: np.ndarray, to_tx: np.ndarray, to_rx: np.ndarray) -> np.nd
     boundary condition as it is, undoubled: half of the echo, the mean of both sides, is the limit. The echo fades over
     cosines between -w and w. On a sheet with both antennas in its plane the currents of both sides cancel: share 0. The
     echo of a facet for one antenna falls with the cosine, without a jump: w = 0, and nothing changes.
+
+    forward  True: what the transmitter lights sends to all sides, through its own body too: share = L(n.u_t)
     """
     n, u, r = (np.asarray(a, float) for a in (normal, to_tx, to_rx))
     width = np.maximum(EDGE_ON * np.linalg.norm(u - r, axis=-1), 1e-30)
     each = [np.clip(0.5 + 0.5 * (n * look).sum(axis=-1) / width, 0, 1) for look in (u, r)]
-    return np.asarray(np.maximum(each[0] + each[1] - 1, 0))
+    return np.asarray(each[0] if forward else np.maximum(each[0] + each[1] - 1, 0))
 
 
-def turned(normal: np.ndarray, to_tx: np.ndarray, to_rx: np.ndarray) -> np.ndarray:
-    """True (...) where the antennas look at the back of a facet: n.(u_t + u_r) < 0. On the side that they look at,
-    `lit_share` is that of a sheet, which reflects on both sides."""
-    return np.asarray((normal * (to_tx + to_rx)).sum(axis=-1) < 0)
+def turned(normal: np.ndarray, to_tx: np.ndarray, to_rx: np.ndarray, forward: bool = False) -> np.ndarray:
+    """True (...) where the antennas look at the back of a facet: n.(u_t + u_r) < 0, n.u_t < 0 for forward scatter. On
+    the side that they look at, `lit_share` is that of a sheet, which reflects on both sides."""
+    return np.asarray((normal * (to_tx if forward else to_tx + to_rx)).sum(axis=-1) < 0)
 
 
 def scattering_matrix(
@@ -140,6 +142,7 @@ def scattering_matrix(
     to_rx: np.ndarray,
     permittivity: np.ndarray,
     up: tuple[float, float, float] = UP,
+    forward: bool = False,
 ) -> np.ndarray:
     """S, complex128 (..., 2, 2), of facets with unit normals: times `lit_share`, 0 where an antenna lies behind one.
 
@@ -152,13 +155,17 @@ def scattering_matrix(
     A perfect conductor seen monostatically has S_HH = S_VV = 2 cos, S_HV = 0. Reciprocal (S_HV = S_VH) monostatically;
     bistatically the tangent-plane approximation is not.
     """
-    cosine, parts = scattering_parts(normal, to_tx, to_rx, up)
+    cosine, parts = scattering_parts(normal, to_tx, to_rx, up, forward)
     r_h, r_v = (a[..., None, None] for a in fresnel(np.clip(cosine, 0, 1), permittivity))
     return np.asarray(parts[0] + r_h * parts[1] + r_v * parts[2], complex)
 
 
 def scattering_parts(
-    normal: np.ndarray, to_tx: np.ndarray, to_rx: np.ndarray, up: tuple[float, float, float] = UP
+    normal: np.ndarray,
+    to_tx: np.ndarray,
+    to_rx: np.ndarray,
+    up: tuple[float, float, float] = UP,
+    forward: bool = False,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Cosine of the angle of incidence (...), and the real matrices (3, ..., 2, 2) P in S = P_0 + R_h P_1 + R_v P_2.
 
@@ -167,7 +174,7 @@ def scattering_parts(
     n, u, r = np.broadcast_arrays(*(np.asarray(a) for a in (normal, to_tx, to_rx)))
     k = -u
     cosine = (n * u).sum(axis=-1)
-    lit = lit_share(n, u, r)
+    lit = lit_share(n, u, r, forward)
     across = cross(k, n)
     length = np.linalg.norm(across, axis=-1, keepdims=True)
     # at normal incidence any tangent does: R_v = -R_h there

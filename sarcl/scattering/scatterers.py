@@ -168,6 +168,7 @@ class _HostFacets:
             None if lit_parts is None else np.where(lit_parts.partly, np.cumsum(lit_parts.partly) - 1, -1)[kept],
             None if is_sampled is None else is_sampled[kept],
             pieces.incoherent[kept] if pieces.incoherent.any() else None,
+            culling.antennas.forward,
         )
 
 
@@ -209,7 +210,8 @@ def check_antennas_above(scene: Scene, antennas: PulseGeometry) -> None:
 
 
 def faces_away(centers: np.ndarray, normals: np.ndarray, antennas: PulseGeometry) -> np.ndarray:
-    """True (k,) for facets that face away from the transmitter, or from the receiver, at every pulse.
+    """True (k,) for facets that face away from the transmitter, or from the receiver, at every pulse; for forward
+    scatter, from the transmitter.
 
     centers  m (n, 3), of the facets, or corners of a box around them;  normals  (k, 3)
 
@@ -217,10 +219,11 @@ def faces_away(centers: np.ndarray, normals: np.ndarray, antennas: PulseGeometry
     that are edge-on to one of two antennas still send back a part (physical_optics.py:lit_share).
     """
     edge_on = 0.0 if antennas.is_monostatic else 2 * EDGE_ON
+    looking = (antennas.tx,) if antennas.forward else (antennas.tx, antennas.rx)
     corners = boxes.box(centers)
     middle, radius = corners.mean(axis=0), float(np.linalg.norm(corners[1] - corners[0])) / 2
     out = np.zeros(len(normals), bool)
-    for ends in (antennas.tx, antennas.rx):
+    for ends in looking:
         look = ends - middle
         distance = np.linalg.norm(look, axis=1)
         if distance.min() <= radius:

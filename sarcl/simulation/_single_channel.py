@@ -39,8 +39,9 @@ class SingleChannel:
         )
         self.first, self.step, n = echo_sampling.sampling(task.waveform, near, far, task.options.compressed)
         antennas = PulseGeometry.sampled(
-            tx, rx, self.reference_range, first=self.first, step=self.step, n_samples=n, window=self.window
-        )
+            tx, rx, self.reference_range, first=self.first, step=self.step, n_samples=n, window=self.window,
+            forward=task.options.forward,
+        )  # fmt: skip
         self.seen = SeenScene(task.original, task.scene, task.waveform, antennas, task.weights)
         self.shape: tuple[int, ...] = len(tx), len(task.request.polarizations), n
 

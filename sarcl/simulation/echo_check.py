@@ -149,6 +149,7 @@ def exact_light(part: FacetSet, antennas: PulseGeometry, pulse: int, frequencies
     ends = [end[pulse] for end in antennas.ends]
     share, mean = np.empty((1, len(index))), np.empty((1, len(index), len(waves)), np.complex128)
     for i, k in enumerate(index.tolist()):
-        occluders = part.lit_parts.occluders_at(pulse, int(part.lit_rows[k]))
-        share[0, i], mean[0, i] = lit_part(part.triangles[k], occluders, ends, waves, part.lit_parts.on_plane)
+        occluders, others = part.lit_parts.occluders_at(pulse, int(part.lit_rows[k]))
+        facet, on_plane = part.triangles[k], part.lit_parts.on_plane
+        share[0, i], mean[0, i] = lit_part(facet, occluders, ends, waves, on_plane, others)
     return Light(index, np.maximum(share, 0), mean)

@@ -11,7 +11,7 @@ from ..base.options import option
 from ..base.validation import choice, flag, number
 from ..blocks.block_options import BlockOptions
 from ..numerics import plan
-from .scene_options import SceneOptions
+from .scene_options import FORWARD, SceneOptions
 
 Skip = Literal[
     "zero reflectivity", "facing away", "range window", "out of beam", "equal channels", "interpolated channels"
@@ -50,6 +50,7 @@ class EchoOptions(SceneOptions, BlockOptions):
         "rad: facets whose normals differ by less are parts of one smooth surface, without an edge between them",
         _crease,
     )
+    forward: bool = option(False, FORWARD + ". For coherent surfaces, and not with an array; sums are in float64", flag)
     channels: Literal["simultaneous", "separated"] = option(
         "simultaneous",
         '"simultaneous": all channels of the array are added up, each after its own matched filter, a row for every '

@@ -11,6 +11,7 @@ import numpy as np
 from ..base import wgs84
 from ..base.boxes import corners
 from ..base.constants import SPEED_OF_LIGHT
+from ..base.errors import warn
 from ..base.validation import converted, finite, instance
 from ..earth.light_time import antennas_in_flight, receivers, transmitters
 from ..earth.viewing import hidden
@@ -21,6 +22,7 @@ from ..scene.scene import Scene
 
 SOME_PULSES = 33  # at which the error of the receiver's positions over the scene is computed
 DEEPEST = -12e3  # m: lower than any ground, the bottom of the sea included
+WIDE = -1e-6  # cosine of the bistatic angle below which forward scatter matters; 90 deg itself is not beyond
 LEAST_SAMPLES = 64  # in the default range window, so that a single point has a profile, too
 
 
@@ -32,6 +34,19 @@ def receiver_positions(track: Trajectory, receiver: Trajectory | None) -> np.nda
     if len(receiver) != len(track):
         raise ValueError(f"receiver has {len(receiver)} positions but track has {len(track)}; give one per pulse")
     return receiver.positions
+
+
+def warn_of_wide_angles(to_tx: np.ndarray, to_rx: np.ndarray, forward: bool) -> None:
+    """Warn of bistatic angles beyond 90 deg, between directions (n, 3) to the antennas, without forward scatter."""
+    cosine = (to_tx * to_rx).sum(axis=1)
+    wide = int((cosine < WIDE).sum())
+    if wide and not forward:
+        largest = np.degrees(np.arccos(max(float(cosine.min()), -1.0)))
+        warn(
+            f"bistatic angles reach {largest:.0f} deg, and exceed 90 deg {wide} times: the field of a body's shadow, "
+            "which these directions see, is left out; pass forward=True",
+            "wide angles",
+        )
 
 
 def in_flight(

@@ -7,12 +7,15 @@ from typing import Any
 
 import numpy as np
 
+from ..base.errors import NotApplicable
 from ..base.validation import instance
+from ..base.vectors import unit
 from ..model.trajectory import Trajectory
 from ..model.waveform import Waveform
 from ..opencl.device import Device
 from ..scattering import antenna_weights
 from ..scattering.antenna_weights import AntennaWeights
+from ..scattering.facet_kinds import random
 from ..scene.scene import Scene
 from . import echo_sampling
 from .echo_options import EchoOptions
@@ -65,6 +68,11 @@ def echo_task(scene: Scene, waveform: Waveform, track: Trajectory, options: Echo
     echo_sampling.receiver_positions(sends, hears)
     # before the range window: rough terrain moves its corners
     real = scene.realized(request.seed).at_frequency(waveform.center)
+    if len(real.triangles):
+        if options.forward:
+            refuse_forward(options, real)
+        tx, rx = sends.positions, echo_sampling.receiver_positions(sends, hears)
+        echo_sampling.warn_of_wide_angles(unit(tx - real.center), unit(rx - real.center), options.forward)
     weights = antenna_weights.weights_of(options.antenna, options.radar, sends, hears, waveform, real.center)
     return EchoTask(
         options=options,
@@ -80,6 +88,18 @@ def echo_task(scene: Scene, waveform: Waveform, track: Trajectory, options: Echo
         weights=weights,
         devices=devices,
     )
+
+
+def refuse_forward(options: EchoOptions, scene: Scene) -> None:
+    """NotApplicable for arrays and surfaces of which forward scatter is not computed."""
+    if options.array is not None:
+        raise NotApplicable("forward=True is for one transmitter and one receiver, not for an array")
+    if random(scene).any():
+        row = int(np.argmax(random(scene)))
+        raise NotApplicable(
+            f"forward=True is for coherent surfaces, and facet {row} has a random echo (roughness, or a diagram of its "
+            "material): give roughness=0 and a smooth material"
+        )
 
 
 def check_subjects(scene: object, waveform: object, track: object) -> None:

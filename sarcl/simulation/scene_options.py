@@ -13,6 +13,12 @@ from ..model.antenna_array import AntennaArray
 from ..model.radar import Radar
 from .track_options import TrackOptions
 
+FORWARD = (
+    "True: what the transmitter lights radiates to all sides, so that a receiver behind a body gets the field of its "
+    "shadow too; other bodies still block both ways. False: to a receiver in front of a facet alone, which holds for "
+    "bistatic angles up to about 90 deg. Of no effect for one antenna"
+)
+
 
 def _shadows(name: str, asked: object) -> bool:
     if isinstance(asked, str) and asked == "embree":

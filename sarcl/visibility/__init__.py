@@ -10,6 +10,7 @@ For other folders:
 For this folder alone:
 
     _aspect_blocks         blocks of pulses that share one illumination
+    _bodies                facets that hang together
     _box_tree              a tree of boxes over facets, for rays
     _certain_shadows       pairs whose shadow misses a facet, or covers it, at all pulses of a few
     _clipping              facets clipped by the shadows on them, on a device

@@ -30,11 +30,13 @@ TOGETHER = 64, 16
 
 @dataclass(frozen=True, eq=False)
 class Receivers:
-    """Facets whose lit part is computed: indices among all (k,), corners, m (k, 3, 3); whether both sides reflect."""
+    """Facets whose lit part is computed: indices among all (k,), corners, m (k, 3, 3); whether both sides reflect; the
+    number of the body of each (k,), for forward scatter alone."""
 
     index: np.ndarray
     triangles: np.ndarray
     two_sided: np.ndarray
+    body: np.ndarray | None = None
     center: np.ndarray = field(init=False)
     normal: np.ndarray = field(init=False)
 
@@ -44,7 +46,8 @@ class Receivers:
 
     def part(self, some: np.ndarray) -> Receivers:
         """Some of them."""
-        return Receivers(self.index[some], self.triangles[some], self.two_sided[some])
+        body = None if self.body is None else self.body[some]
+        return Receivers(self.index[some], self.triangles[some], self.two_sided[some], body)
 
     def packed(self, which: np.ndarray, origin: np.ndarray, on_plane: float) -> np.ndarray:
         """Facets `which` as the kernels read them, about `origin` (n, RECEIVER)."""
@@ -65,6 +68,8 @@ class Clipper:
     """Occluders, m (n, 3, 3), whose shadows are cut off facets on a device.
 
     origin    of the kernels, m (3,);  on_plane  m: corners nearer to a facet's plane lie in it
+    bodies    number of the body of each occluder (n,), for forward scatter alone: facets do not shade the receiver's
+              view of those of their own body; None: for echoes of both antennas' sides
     """
 
     device: Device
@@ -72,6 +77,7 @@ class Clipper:
     origin: np.ndarray
     on_plane: float
     max_bytes: float
+    bodies: np.ndarray | None = None
 
     def light(
         self, receivers: Receivers, which: np.ndarray, pairs: np.ndarray, antennas: np.ndarray, waves: np.ndarray,
@@ -85,7 +91,7 @@ class Clipper:
         """
         if not len(antennas) or not len(which):
             return
-        if len(pairs) < FEW_PAIRS or len(antennas) <= FEW_PULSES:
+        if len(pairs) < FEW_PAIRS or len(antennas) <= FEW_PULSES or self.bodies is not None:
             clipped = np.flatnonzero(np.isin(which, pairs[:, 0]) | (len(waves) > 0))
             for pulses, part, share, mean in self._in_parts(receivers, which[clipped], pairs, antennas, waves):
                 yield pulses, clipped[part], share, mean
@@ -109,7 +115,9 @@ class Clipper:
         self, receivers: Receivers, pairs: np.ndarray, antennas: np.ndarray, margin: float = 0.0
     ) -> np.ndarray:
         """Of pairs (n, 2): whether shadows miss the receiver, or cover it, as antennas up to `margin`, m, from these
-        cast them (n,)."""
+        cast them (n,). Of forward scatter all are undecided."""
+        if self.bodies is not None:
+            return np.full(len(pairs), UNDECIDED, np.uint8)
         state = np.empty(len(pairs), np.uint8)
         for first in range(0, len(pairs), PAIRS_AT_ONCE):
             part = slice(first, first + PAIRS_AT_ONCE)
@@ -160,7 +168,7 @@ class Clipper:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Shares (n_pulses, n) and means (n_pulses, n, m) of facets `which`, of whose pairs these are the occluders."""
         device, n_pairs = self.device, max(len(occluder), 1)
-        macros = {"ENDS": antennas.shape[1], "PARTS": PARTS[device.is_cpu]}
+        macros = {"ENDS": antennas.shape[1], "PARTS": PARTS[device.is_cpu], "FORWARD": int(self.bodies is not None)}
         cast = device.kernel(KERNELS, "cast_shadows", WAVES=0, **macros)
         receivers = device.upload(facets.packed(which, self.origin, self.on_plane))
         (pulses, ends), seen = antennas.shape[:2], device.upload(antennas)
@@ -170,6 +178,8 @@ class Clipper:
             picked, at = np.unique(occluder, return_inverse=True)
             solid = device.upload((self.occluders[picked] - self.origin).reshape(-1, 9))
             owner = np.repeat(np.arange(len(which), dtype=np.int32), np.diff(begins))
+            if self.bodies is not None and facets.body is not None:
+                at = np.where(self.bodies[occluder] == facets.body[which][owner], ~at, at)
             device.run(
                 cast, (n_pairs, pulses * ends), None, launch_numbers(KERNELS, "cast_shadows", n_pairs=n_pairs),
                 receivers, device.upload(owner), device.upload(at.astype(np.int32)), solid, seen, shadows, corners,

@@ -15,6 +15,7 @@ from ..opencl.choose_device import with_float64
 from ..opencl.device import Device
 from ..scene.triangles import areas
 from ._aspect_blocks import pulse_blocks, shadow_length
+from ._bodies import bodies_of
 from ._certain_shadows import MISSED
 from ._clipping import TOGETHER, Clipper, Receivers
 from ._shadow_pairs import candidate_pairs
@@ -101,10 +102,12 @@ class LitParts:
         *,
         max_bytes: float,
         margin: float = 0.0,
+        forward: bool = False,
         progress: Callable[[int, int], object] | None = None,
     ) -> None:
         """ends  positions of the transmitter, and of a receiver elsewhere, m (n_pulses, 3) each
         max_bytes  on the device;  margin  m: antennas asked for later stand up to this far from `ends`
+        forward   a second antenna sees what the first one lights from any side, shaded by other bodies alone
         progress  called as progress(pulse, pulses)
         """
         self.max_bytes, self._margin, self._first = max_bytes, margin, 0
@@ -114,10 +117,16 @@ class LitParts:
         self._on_plane = ON_PLANE * float(np.linalg.norm(bounds[1] - bounds[0]))
         keep = np.flatnonzero(pieces.wanted & (areas(triangles) > 0))
         self._bounds, self._occluders = bounds, occluders[areas(occluders) > 0]
-        self._clipper = Clipper(with_float64(device), self._occluders, self._origin, self._on_plane, max_bytes)
-        self._pieces = Receivers(keep, triangles[keep], two_sided[keep])
+        own = others = None
+        if forward and len(ends) == 2:
+            body = bodies_of(np.concatenate([pieces.given, self._occluders]))
+            own, others = body[: len(pieces.given)], body[len(pieces.given) :]
+        frame = self._origin, self._on_plane, max_bytes
+        self._clipper = Clipper(with_float64(device), self._occluders, *frame, others)
+        self._pieces = Receivers(keep, triangles[keep], two_sided[keep], None if own is None else own[of[keep]])
         self._parent, first = np.unique(of[keep], return_index=True)
-        parents = Receivers(self._parent, pieces.given[self._parent], two_sided[keep][first])
+        body_of_parent = None if own is None else own[self._parent]
+        parents = Receivers(self._parent, pieces.given[self._parent], two_sided[keep][first], body_of_parent)
         self._child = np.searchsorted(self._parent, of[keep])  # the parent of each piece
         self._cut = len(parents.index) < len(keep)
         self._blocks: list[_Block] = []
@@ -216,11 +225,15 @@ class LitParts:
         # a facet is not seen from a side that is turned away from an antenna by more than directions change
         # and between two antennas, one of which may be edge-on to it (physical_optics.py:lit_share)
         away_by = 2 * turn + (2 * EDGE_ON if len(antennas) == 2 else 0.0)
-        front = np.all([c > -away_by for c in cosines], axis=0)
-        back = r.two_sided & np.all([c < away_by for c in cosines], axis=0)
-        seen, level = np.flatnonzero(front | back), dot(r.normal, r.center - self._origin)
+        fronts, backs = [c > -away_by for c in cosines], [c < away_by for c in cosines]
+        if r.body is None:
+            both = np.all(fronts, axis=0), r.two_sided & np.all(backs, axis=0)
+            sides = [both] * len(antennas)
+        else:  # the receiver may look at either side of what the transmitter lights
+            sides = [(fronts[0], r.two_sided & backs[0]), (fronts[1], backs[1])]
+        seen, level = np.flatnonzero(sides[0][0] | sides[0][1]), dot(r.normal, r.center - self._origin)
 
-        def found(at: np.ndarray) -> np.ndarray:
+        def found(at: np.ndarray, front: np.ndarray, back: np.ndarray) -> np.ndarray:
             ahead = at - r.center
             distance = np.sqrt(dot(ahead, ahead))
             look = ahead / distance[:, None]
@@ -246,7 +259,7 @@ class LitParts:
 
             return candidate_pairs(r.triangles[seen], solid, at, turn, span.reach, casts)
 
-        found_of = [found(at) for at in antennas]
+        found_of = [found(at, *side) for at, side in zip(antennas, sides, strict=True)]
         pairs = found_of[0] if len(found_of) == 1 else np.unique(np.concatenate(found_of), axis=0)
         pairs = np.stack([seen[pairs[:, 0]], some[pairs[:, 1]]], axis=1)
         return np.asarray(pairs[self._clipper.sorted_out(r, pairs, span.antennas, self._margin) != MISSED])
@@ -274,13 +287,17 @@ class LitParts:
                     mean[here][pulses, some] = part_mean
         return share, mean
 
-    def occluders_at(self, pulse: int, row: int) -> np.ndarray:
-        """Facets that may cast a shadow on partly lit facet number `row`, as a pulse sees it, m (n, 3, 3)."""
+    def occluders_at(self, pulse: int, row: int) -> tuple[np.ndarray, np.ndarray | None]:
+        """Facets that may cast a shadow on partly lit facet number `row`, as a pulse sees it, m (n, 3, 3); and which of
+        them belong to other bodies (n,), of forward scatter alone."""
         pulse += self._first
         block = next(block for block in self._blocks if block.span.first <= pulse < block.span.stop)
         pairs = self._pairs_of(block)
         begin, end = np.searchsorted(pairs[:, 0], [self._rows[row], self._rows[row] + 1])
-        return np.asarray(self._occluders[pairs[begin:end, 1]])
+        some, bodies = pairs[begin:end, 1], self._clipper.bodies
+        if bodies is None or self._pieces.body is None:
+            return self._occluders[some], None
+        return self._occluders[some], bodies[some] != self._pieces.body[self._rows[row]]
 
     @property
     def on_plane(self) -> float:

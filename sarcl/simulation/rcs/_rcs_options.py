@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from ...base.options import option
 from ...base.validation import flag
 from ...numerics.run_options import RunOptions
+from ..scene_options import FORWARD
 from ..track_options import Polarization, polarizations
 
 
@@ -33,6 +34,7 @@ class RcsOptions(RunOptions):
         "result. H is horizontal, V in a plane with z. Points keep the polarisation: they have no echo in HV and VH",
         _polarization,
     )
+    forward: bool = option(False, FORWARD, flag)
     shadows: bool = option(
         True, "True: of every facet only the part counts that both directions see; points are always seen", flag
     )

@@ -22,6 +22,7 @@ from ...scattering.mesh_quality import facet_error
 from ...scene.triangles import centroids, normals
 from ...visibility.lit_parts import FacetPieces, LitParts
 from ..echo_check import exact_light
+from ..echo_sampling import warn_of_wide_angles
 from ._rcs_task import UP, RcsTask
 
 # Distance of the antennas from the scene, over its size: directions differ over the scene by the inverse, and float64
@@ -89,6 +90,7 @@ class RcsPlan:
         part = self._facets()
         if part is not None:
             warn_of_curves(task)
+            warn_of_wide_angles(task.to_tx, task.to_rx, task.options.forward)
             self._add_facets(part, out)
             if task.options.check:
                 self._confirm(part, out)
@@ -133,6 +135,7 @@ class RcsPlan:
                 scene.triangles,
                 self._antennas,
                 max_bytes=budget(task.device, task.options.max_bytes),
+                forward=task.options.forward,
                 progress=self._progress("shadows"),
             )
             rows = np.where(lit_parts.partly, np.cumsum(lit_parts.partly) - 1, -1)
@@ -151,6 +154,7 @@ class RcsPlan:
             np.zeros(len(keep), np.complex128),
             lit_parts,
             rows,
+            forward=task.is_forward,
         )
 
     def _progress(self, stage: str) -> Callable[[int, int], None]:
@@ -211,7 +215,7 @@ class RcsPlan:
 def _facing(part: FacetSet, light: Light, to_tx: np.ndarray, to_rx: np.ndarray) -> tuple[FacetSet, Light]:
     """Those facets that both directions look at from a side that reflects, and what they see of these."""
     normal = normals(part.triangles)
-    cosines = np.stack([normal @ to_tx, normal @ to_rx])
+    cosines = np.stack([normal @ to_tx] if part.forward else [normal @ to_tx, normal @ to_rx])
     side = np.where(part.two_sided & (cosines.sum(axis=0) < 0), -1.0, 1.0)
     rows = np.flatnonzero((side * cosines > -2 * EDGE_ON).all(axis=0))
     number = np.full(len(part), -1)

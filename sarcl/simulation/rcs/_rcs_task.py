@@ -41,6 +41,11 @@ class RcsTask:
         """Directions of the transmitter, and of the receiver where they differ."""
         return [self.to_tx] if self.to_rx is self.to_tx else [self.to_tx, self.to_rx]
 
+    @property
+    def is_forward(self) -> bool:
+        """Whether forward scatter was asked for, and the receiver is another antenna."""
+        return self.options.forward and self.to_rx is not self.to_tx
+
     @cached_property
     def device(self) -> Device:
         """The device that finds lit parts, opened when it is first needed."""
