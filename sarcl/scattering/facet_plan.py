@@ -157,8 +157,9 @@ class _PlanSearch:
             return False
         if self.exact is not None and count > WORTH_FLOAT32 * self.exact.n_facets:
             return False
-        forward = self.view.antennas.forward  # kernels know no forward scatter
-        is_small = forward or (count * limits.terms <= FLOAT64_TERMS and self.cross_ratio <= DARK)
+        # the kernels know neither forward scatter nor thin sheets
+        on_host = self.view.antennas.forward or bool(self.view.scene.sheets.any())
+        is_small = on_host or (count * limits.terms <= FLOAT64_TERMS and self.cross_ratio <= DARK)
         rounding = self._rounding(edge) + self.weights.rounding
         gain, shape = self._shape(edge, 0.0 if is_small else rounding) if mirror.any() else (1.0, 0.0)
         if is_small and self.exact is None and gain * shape <= SHARE * self.tolerance:
@@ -166,7 +167,7 @@ class _PlanSearch:
             self.exact = FacetPlan(edge, nodes, shape, count, power=1, gain=gain, is_float64=True)
         self.least_rounding = min(self.least_rounding, self._required(gain, rounding))
         error = rounding + shape
-        if forward:
+        if on_host:
             self.least = min(self.least, self._required(gain, shape))
         elif self._required(gain, error) < self.tolerance:
             self.interpolates = True

@@ -94,6 +94,27 @@ def fresnel(cosine: np.ndarray, permittivity: np.ndarray) -> tuple[np.ndarray, n
     return h, v
 
 
+def slab(
+    cosine: np.ndarray, permittivity: np.ndarray, cycles: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """R_h, R_v, T_h, T_v complex128 (...) of a sheet in vacuum, with its middle as the plane of zero phase.
+
+        R = r (1 - p^2)/(1 - r^2 p^2) s,   T = (1 - r^2) p/(1 - r^2 p^2) s
+        p = exp(-2j pi d sqrt(eps - sin^2)),   s = exp(2j pi d cos)
+
+    cosine, permittivity  as of `fresnel`, whose coefficients r are;  cycles  d, thickness over wavelength
+    s: each face lies half a thickness before the plane, and T is relative to the wave without the sheet.
+    Source: ITU-R P.2040-3, section 2.2.2, single-layer slab; Born and Wolf, Principles of Optics, section 1.6.4.
+    """
+    c, eps = np.broadcast_arrays(np.asarray(cosine, float), np.asarray(permittivity, complex))
+    path = np.exp(-2j * np.pi * cycles * np.sqrt(eps - 1 + c * c))
+    middle = np.exp(2j * np.pi * cycles * c)
+    both = [(r, middle / (1 - (r * path) ** 2)) for r in fresnel(c, eps)]
+    r_h, r_v = (r * (1 - path**2) * factor for r, factor in both)
+    t_h, t_v = ((1 - r**2) * path * factor for r, factor in both)
+    return r_h, r_v, t_h, t_v
+
+
 def polarisation(sight: np.ndarray, up: tuple[float, float, float] = UP) -> tuple[np.ndarray, np.ndarray]:
     """Unit vectors h = s x up/|s x up| and v = h x s of lines of sight s, (..., 3), from an antenna to a facet.
 
@@ -167,9 +188,11 @@ def scattering_parts(
     up: tuple[float, float, float] = UP,
     forward: bool = False,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Cosine of the angle of incidence (...), and the real matrices (3, ..., 2, 2) P in S = P_0 + R_h P_1 + R_v P_2.
+    """Cosine of the angle of incidence (...), and the real matrices (4, ..., 2, 2) P in S = P_0 + R_h P_1 + R_v P_2.
 
-    What does not depend on the frequency. By e_r.k_s = 0: e_r.k_s x a = (e_r x k_s).a and e_r.k_s x (k_s x a) = -e_r.a.
+    What does not depend on the frequency. The last one is the part of P_0 of waves with the electric field along the
+    plane: of a sheet, the field behind it counts against that in front: S - T_h P_3 - T_v (P_0 - P_3).
+    By e_r.k_s = 0: e_r.k_s x a = (e_r x k_s).a and e_r.k_s x (k_s x a) = -e_r.a.
     """
     n, u, r = np.broadcast_arrays(*(np.asarray(a) for a in (normal, to_tx, to_rx)))
     k = -u
@@ -184,13 +207,14 @@ def scattering_parts(
     d, nt = cross(k, t), cross(n, t)
     h, v = polarisation(-r, up)
     turned = -v, h  # e_r x k_s
-    out = np.empty((3, *lit.shape, 2, 2))
+    out = np.empty((4, *lit.shape, 2, 2))
     for j, e in enumerate(polarisation(k, up)):
         et, ed = _dot(e, t), _dot(e, d)
         for i, (received, across) in enumerate(zip((h, v), turned, strict=True)):
             horizontal = et * _dot(across, nt), cosine * et * _dot(received, t)  # of n x E, and of eta n x H
             vertical = cosine * ed * _dot(across, t), -ed * _dot(received, nt)
-            parts = sum(horizontal) + sum(vertical), horizontal[0] - horizontal[1], vertical[1] - vertical[0]
+            along = sum(horizontal)
+            parts = along + sum(vertical), horizontal[0] - horizontal[1], vertical[1] - vertical[0], along
             for part, value in zip(out, parts, strict=True):
                 part[..., i, j] = np.where(lit > 0, lit * value, 0)
     return cosine, out

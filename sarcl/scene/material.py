@@ -20,7 +20,7 @@ COHERENT = ("smooth", "sinc")  # diagrams of a coherent reflection, like that of
 
 @dataclass(frozen=True)
 class Material:
-    """A homogeneous half space under a surface that may be rough below the size of a facet.
+    """A homogeneous half space under a surface that may be rough below the size of a facet; or a thin sheet.
 
     eps_r         relative permittivity eps' - j eps'', the same at all frequencies: eps' at least 1, eps'' at least 0
     conductivity  S/m, whose losses add to eps''; inf is a perfect conductor
@@ -32,6 +32,8 @@ class Material:
     width         rad, angle d at which "exp" is 1/e
     reflectivity  factor on the amplitude, 0 to 1
     name          for messages and scenario files
+    thickness     m, of a smooth sheet with its middle in the facets' plane: it reflects at both of its sides and lets
+                  waves through. For open facets that reflect from both sides; default 0, a half space
 
     `Material()` is a perfect conductor; a real eps_r alone gives a lossless dielectric. ValueError for impossible
     values.
@@ -45,6 +47,7 @@ class Material:
     width: float = 0.0
     reflectivity: float = 1.0
     name: str = ""
+    thickness: float = 0.0
 
     def __post_init__(self) -> None:
         validation.choice("diagram", self.diagram, DIAGRAMS)
@@ -55,8 +58,9 @@ class Material:
             "height": 0.0 if self.diagram in COHERENT else np.inf,
             "width": 0.0,
             "reflectivity": 1.0,
+            "thickness": 0.0,
         }
-        for name in ("eps_r", "conductivity", "height", "width", "reflectivity"):
+        for name in ("eps_r", "conductivity", "height", "width", "reflectivity", "thickness"):
             value = getattr(self, name)
             if name == "eps_r" and value is not None and np.iscomplexobj(value):
                 value = _lossy(value)
@@ -68,7 +72,13 @@ class Material:
                 f"eps_r is {self.eps_r:g}; a relative permittivity is at least 1 (vacuum), with losses as a negative "
                 "imaginary part or in conductivity"
             )
-        for name, unit in (("conductivity", "S/m"), ("height", "m"), ("width", "rad"), ("reflectivity", "")):
+        for name, unit in (
+            ("conductivity", "S/m"),
+            ("height", "m"),
+            ("width", "rad"),
+            ("reflectivity", ""),
+            ("thickness", "m"),
+        ):
             if not getattr(self, name) >= 0:
                 raise ValueError(f"{name} is {getattr(self, name):g} {unit}".rstrip() + "; it cannot be negative")
         if self.reflectivity > 1:
@@ -84,6 +94,11 @@ class Material:
             raise ValueError(
                 f"width is {self.width:g} rad with diagram {self.diagram!r}; 'exp' needs a width greater than 0, "
                 "others take none"
+            )
+        if self.thickness and (self.conducting or self.height or self.diagram not in COHERENT):
+            raise ValueError(
+                f"thickness is {self.thickness:g} m of a perfect conductor or a rough surface; give it to smooth "
+                "dielectrics, and to metals a conductivity"
             )
         if not isinstance(self.name, str):
             raise TypeError(f"name is a {type(self.name).__name__}; give a string")

@@ -117,6 +117,13 @@ class Scene:
         if factor is not None:
             object.__setattr__(self, "reflectivity", validation.sealed(self.reflectivity * factor))
         object.__setattr__(self, "materials", table)
+        closed = self.sheets & ~self.two_sided
+        if closed.any():
+            row = int(np.argmax(closed))
+            raise ValueError(
+                f"facet {row} reflects from one side alone, as a closed body does, and its material has a thickness of "
+                f"{table[self.material[row]].thickness:g} m; sheets are open: give two_sided=True, or no thickness"
+            )
 
     @classmethod
     def points(cls, positions: ArrayLike, amplitudes: ArrayLike = 1.0, *, apertures: ArrayLike = 0.0) -> Scene:
@@ -326,6 +333,11 @@ class Scene:
         joined["material"] = validation.sealed(np.concatenate(parts))
         largest = max((s.heights for s in (self, other)), key=lambda h: 0 if h is None else h[2].size)
         return Scene(**joined, materials=table, heights=largest)
+
+    @property
+    def sheets(self) -> NDArray[np.bool_]:
+        """Facets (k,) that are thin sheets: their material has a thickness."""
+        return np.array([m.thickness > 0 for m in self.materials], bool)[self.material]
 
     @property
     def has_random_points(self) -> bool:

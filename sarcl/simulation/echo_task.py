@@ -16,6 +16,7 @@ from ..opencl.device import Device
 from ..scattering import antenna_weights
 from ..scattering.antenna_weights import AntennaWeights
 from ..scattering.facet_kinds import random
+from ..scattering.mesh_quality.facet_groups import coplanar_groups
 from ..scene.scene import Scene
 from . import echo_sampling
 from .echo_options import EchoOptions
@@ -69,6 +70,8 @@ def echo_task(scene: Scene, waveform: Waveform, track: Trajectory, options: Echo
     # before the range window: rough terrain moves its corners
     real = scene.realized(request.seed).at_frequency(waveform.center)
     if len(real.triangles):
+        if options.shadows:
+            refuse_hidden_by_sheets(real)
         if options.forward:
             refuse_forward(options, real)
         tx, rx = sends.positions, echo_sampling.receiver_positions(sends, hears)
@@ -88,6 +91,15 @@ def echo_task(scene: Scene, waveform: Waveform, track: Trajectory, options: Echo
         weights=weights,
         devices=devices,
     )
+
+
+def refuse_hidden_by_sheets(scene: Scene) -> None:
+    """NotApplicable where facets may lie behind thin sheets, through which echoes are not computed."""
+    if scene.sheets.any() and coplanar_groups(scene, np.arange(len(scene.triangles)), random(scene)).any():
+        raise NotApplicable(
+            "the scene has thin sheets (a material with a thickness), and echo does not compute what is seen through "
+            "them; use rcs, which does, or give shadows=False where nothing lies behind them"
+        )
 
 
 def refuse_forward(options: EchoOptions, scene: Scene) -> None:

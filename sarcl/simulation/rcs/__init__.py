@@ -8,5 +8,6 @@ For this folder alone:
 
     _rcs_options  options of rcs
     _rcs_plan     facets and points summed in float64, direction by direction
+    _screens      what is seen through thin sheets
     _rcs_task     one task of rcs: its arguments, checked
 """

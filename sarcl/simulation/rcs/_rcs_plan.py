@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from ...base.constants import EDGE_ON, SPEED_OF_LIGHT
-from ...base.errors import ToleranceMissed, ToleranceUnreachable, warn
+from ...base.errors import NotApplicable, ToleranceMissed, ToleranceUnreachable, warn
 from ...base.forecast import Forecast
 from ...base.report import ErrorTerm, root_sum_square
 from ...base.tolerances import rounded_up
@@ -17,13 +17,15 @@ from ...model.waveform import Waveform
 from ...numerics.error_bounds import FLOAT32
 from ...numerics.pulse_geometry import PulseGeometry
 from ...opencl.memory_budget import budget
-from ...scattering.facets import FacetSet, Light
+from ...scattering.facets import POLARIZATIONS, FacetSet, Light
 from ...scattering.mesh_quality import facet_error
+from ...scattering.mesh_quality.facet_groups import coplanar_groups
 from ...scene.triangles import centroids, normals
 from ...visibility.lit_parts import FacetPieces, LitParts
 from ..echo_check import exact_light
 from ..echo_sampling import warn_of_wide_angles
 from ._rcs_task import UP, RcsTask
+from ._screens import Screens
 
 # Distance of the antennas from the scene, over its size: directions differ over the scene by the inverse, and float64
 # resolves them to 1e-16 at any distance
@@ -87,6 +89,8 @@ class RcsPlan:
         task = self.task
         out = np.zeros((len(task.to_tx), len(task.frequencies), len(task.polarizations)), np.complex128)
         self._add_points(out)
+        if task.options.check and self._screens is not None:
+            raise NotApplicable("check=True has no second way to compute what thin sheets let through; leave it out")
         part = self._facets()
         if part is not None:
             warn_of_curves(task)
@@ -120,6 +124,18 @@ class RcsPlan:
         """Places of the antennas, m (n, 3), one or two for each direction."""
         return [self._place(u) for u in self.task.ends]
 
+    @cached_property
+    def _screens(self) -> Screens | None:
+        """Thin sheets that facets may be seen through; None: there are none, or nothing else."""
+        task, scene = self.task, self.task.scene
+        if not self._may_shade or not scene.sheets.any():
+            return None
+        if not coplanar_groups(scene, np.arange(len(scene.triangles)), np.zeros(len(scene.triangles), bool)).any():
+            return None
+        keep, device = np.flatnonzero(scene.reflectivity > 0), task.device
+        max_bytes = budget(device, task.options.max_bytes)
+        return Screens.of(scene, keep, self._antennas, device, max_bytes, self._progress("shadows"))
+
     def _facets(self) -> FacetSet | None:
         """The facets that reflect, with what the directions see of them."""
         task, scene = self.task, self.task.scene
@@ -127,7 +143,7 @@ class RcsPlan:
         if not len(keep):
             return None
         lit_parts, rows = None, None
-        if self._may_shade:
+        if self._may_shade and self._screens is None:
             pieces = FacetPieces.uncut(scene.triangles[keep], scene.two_sided[keep])
             lit_parts = LitParts(
                 task.device,
@@ -175,8 +191,24 @@ class RcsPlan:
                 light = part.light(first, [end[first : rows.stop] for end in ends], waves)
                 for p in rows:
                     seen = Light(light.index, light.share[p - first :][:1], light.mean[p - first :][:1])
-                    out[p, band] += self._sum(part, p, frequencies, seen)[0]
+                    if self._screens is None:
+                        out[p, band] += self._sum(part, p, frequencies, seen)[0]
+                    else:
+                        out[p, band] += self._through(self._screens, part, p, frequencies)
                 report(number * n + rows.stop, len(bands) * n)
+
+    def _through(self, screens: Screens, part: FacetSet, p: int, frequencies: np.ndarray) -> np.ndarray:
+        """As `_sum`, of facets that are seen past thin sheets, or through them: (n frequencies, n_polarizations)."""
+        task, waves = self.task, 2 * np.pi * frequencies / SPEED_OF_LIGHT
+        every, columns = np.arange(len(part)), [POLARIZATIONS.index(name) for name in task.polarizations]
+        asked = replace(self, task=replace(task, polarizations=POLARIZATIONS))
+        total = np.zeros((len(frequencies), 4), np.complex128)
+        for some, mean in screens.means(p, self._place(task.to_tx[p : p + 1]), waves):
+            light = Light(every, np.ones((1, len(part))), mean)
+            matrix = asked._sum(part, p, frequencies, light)[0].reshape(-1, 2, 2)
+            through = screens.transmission(some, task.to_tx[p], frequencies)
+            total += (np.swapaxes(through, 1, 2) @ matrix @ through).reshape(-1, 4)
+        return total[:, columns]
 
     def _sum(self, part: FacetSet, p: int, frequencies: np.ndarray, light: Light) -> tuple[np.ndarray, np.ndarray]:
         """Amplitudes of facets in direction p (n frequencies, n_polarizations), and their power at random phases.

@@ -70,6 +70,8 @@ def spectral_task(
             "the track is that of an orbit, with the receiver where it is at the echo's arrival; spectral_echo is for "
             "straight tracks, stop and go: use echo"
         )
+    if scene.sheets.any():
+        raise NotApplicable("the scene has thin sheets (a material with a thickness), for which use echo or rcs")
     line = straight_track(track, waveform.center + waveform.bandwidth / 2, STRAIGHT * request.tolerance)
     tx = track.positions
     point = scene.center if options.reference is None else np.asarray(options.reference)
