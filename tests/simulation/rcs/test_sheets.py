@@ -73,8 +73,10 @@ def test_a_sheet_of_vacuum_changes_nothing_and_two_sheets_count_both():
     plate = shapes.plate((0.3, 0.3), position=(0, 0, -1.0), rotation=(0, 0.5, 0))
 
     def seen(*materials):
+        sizes = [(10, 10), (20, 20)]  # of the lower, and of an upper one before all of it
         sheets = [
-            shapes.plate((10 + 10 * i,) * 2, material=m, position=(0, 0, 0.3 * i)) for i, m in enumerate(materials)
+            shapes.plate(size, material=m, position=(0, 0, 0.3 * i))
+            for i, (size, m) in enumerate(zip(sizes, materials, strict=False))
         ]
         front = [sarcl.rcs(sheet, 0.0, elevation, frequency, polarization=("HH", "VV")) for sheet in sheets]
         scene = plate
