@@ -11,7 +11,7 @@ from ..base.vectors import cross, unit
 from ..opencl.device import Device
 from ..opencl.launch_numbers import launch_numbers
 from ..scene.triangles import areas, centroids, edges, normals
-from ._certain_shadows import COVERED, UNDECIDED, certain_shadows
+from ._certain_shadows import COVERED, MISSED, UNDECIDED, certain_shadows
 from ._shadow_pairs import PAIRS_AT_ONCE
 
 KERNELS = "lit_parts.cl"
@@ -91,7 +91,7 @@ class Clipper:
         """
         if not len(antennas) or not len(which):
             return
-        if len(pairs) < FEW_PAIRS or len(antennas) <= FEW_PULSES or self.bodies is not None:
+        if len(pairs) < FEW_PAIRS or len(antennas) <= FEW_PULSES:
             clipped = np.flatnonzero(np.isin(which, pairs[:, 0]) | (len(waves) > 0))
             for pulses, part, share, mean in self._in_parts(receivers, which[clipped], pairs, antennas, waves):
                 yield pulses, clipped[part], share, mean
@@ -115,9 +115,17 @@ class Clipper:
         self, receivers: Receivers, pairs: np.ndarray, antennas: np.ndarray, margin: float = 0.0
     ) -> np.ndarray:
         """Of pairs (n, 2): whether shadows miss the receiver, or cover it, as antennas up to `margin`, m, from these
-        cast them (n,). Of forward scatter all are undecided."""
-        if self.bodies is not None:
-            return np.full(len(pairs), UNDECIDED, np.uint8)
+        cast them (n,)."""
+        if self.bodies is None or receivers.body is None:
+            return self._state(receivers, pairs, antennas, margin)
+        # of forward scatter each antenna looks at its own side of a facet, and the second one past its own body
+        tx, rx = (self._state(receivers, pairs, antennas[:, [end]], margin) for end in (0, 1))
+        rx = np.where(self.bodies[pairs[:, 1]] == receivers.body[pairs[:, 0]], MISSED, rx)
+        is_covered, is_missed = (tx == COVERED) | (rx == COVERED), (tx == MISSED) & (rx == MISSED)
+        return np.where(is_covered, COVERED, np.where(is_missed, MISSED, UNDECIDED)).astype(np.uint8)
+
+    def _state(self, receivers: Receivers, pairs: np.ndarray, antennas: np.ndarray, margin: float) -> np.ndarray:
+        """As `sorted_out`, of antennas that look at one side of a facet."""
         state = np.empty(len(pairs), np.uint8)
         for first in range(0, len(pairs), PAIRS_AT_ONCE):
             part = slice(first, first + PAIRS_AT_ONCE)

@@ -25,9 +25,8 @@ TOLERANCE = {
 
 def test_a_sphere_follows_mie_to_the_forward_direction():
     ball = shapes.sphere(1.0, facets=20_000)
-    s = sarcl.rcs(
-        ball, 0.0, 0.0, FREQUENCY, receiver=(np.radians(ANGLES), 0.0), polarization=("HH", "VV"), forward=True
-    )
+    looks = {"receiver": (np.radians(ANGLES), 0.0), "polarization": ("HH", "VV"), "forward": True}
+    s = sarcl.rcs(ball, 0.0, 0.0, FREQUENCY, shadows=False, **looks)  # nothing shades a convex body but itself
     # V stands across the plane of both directions, H lies in it and turns with the line of sight
     across, along = conducting_sphere(1.0, KA, np.pi - np.radians(ANGLES))
     e_plane, h_plane = (20 * np.log10(np.abs(a / b)) for a, b in ((s[:, 0], -along), (s[:, 1], across)))
@@ -36,6 +35,23 @@ def test_a_sphere_follows_mie_to_the_forward_direction():
     assert np.sqrt((e_plane[near] ** 2).mean()) < TOLERANCE["E plane"]
     assert max(abs(h_plane[-1]), abs(e_plane[-1])) < TOLERANCE["forward"]
     assert np.angle(s[-1] / np.array([-along[-1], across[-1]])) == pytest.approx(0, abs=np.radians(10))
+
+
+def test_shadows_change_nothing_on_a_convex_body():
+    ball, receiver = shapes.sphere(1.0, facets=320), (np.linspace(0.2, 3.0, 5), 0.1)
+    values = [
+        sarcl.rcs(ball, 0.3, 0.2, 1e8, receiver=receiver, forward=True, shadows=shadows) for shadows in (True, False)
+    ]
+    assert values[0] == pytest.approx(values[1], rel=TOLERANCE["lit part"])
+
+
+def test_of_its_own_body_a_facet_in_the_transmitters_shadow_sends_nothing():
+    """Seen from behind, one plate of a dihedral hides all of the other."""
+    corner, hidden = shapes.dihedral((1.0, 1.0)), (np.pi, 0.3)
+    receiver = (np.linspace(0.2, 2.9, 5), 0.4)
+    s = sarcl.rcs(corner, *hidden, FREQUENCY, receiver=receiver, forward=True)
+    wall = corner.part(np.abs(corner.triangles[:, :, 0]).max(axis=1) == 0)
+    assert s == pytest.approx(sarcl.rcs(wall, *hidden, FREQUENCY, receiver=receiver, forward=True), rel=1e-6)
 
 
 def test_what_a_sheet_blocks_is_what_it_sends_forward():
