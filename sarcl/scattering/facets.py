@@ -220,7 +220,7 @@ class FacetSet:
         light  of this pulse at these frequencies: facets that are lit in part; None: every facet is seen whole
         """
         from ._rough_surface import rough_mean
-        from .physical_optics import fresnel, normals_and_areas, scattering_parts, slab, triangle_mean, turned
+        from .physical_optics import normals_and_areas, scattering_parts, triangle_mean, turned
 
         places = centroids(self.triangles)
         to_tx, to_rx = (unit(end - places) for end in (tx, rx))
@@ -235,8 +235,7 @@ class FacetSet:
         n, k = len(frequencies), len(self)
         out = np.empty((n, k, len(polarizations)), np.complex128)
         step = max(1, AT_ONCE // max(k, 1))
-        thickness = np.array([m.thickness for m in self.materials])[self.material]
-        root, sheet = np.ones(k), thickness > 0
+        root = np.ones(k)
         if light is not None:
             root[light.index] = np.sqrt(light.share[0])
         for first in range(0, n, step):
@@ -259,21 +258,30 @@ class FacetSet:
             )
             if (eps == eps[:1]).all():
                 eps = eps[:1]
-            r_h, r_v = fresnel(np.clip(cosine, 0, 1), eps[:, self.material])
-            behind_h = behind_v = None
-            if sheet.any():
-                *through, behind_h, behind_v = slab(
-                    np.clip(cosine, 0, 1), np.where(sheet, eps[:, self.material], 2), thickness * wave
-                )
-                r_h, r_v = (np.where(sheet, new, old) for new, old in zip(through, (r_h, r_v), strict=True))
+            r_h, r_v, behind = self._coefficients(np.clip(cosine, 0, 1), eps[:, self.material], wave)
             mean *= np.sqrt(np.pi) * wave * areas * self.reflectivity
             for i in range(len(some)):
                 matrix = parts[0, :, i] + r_h * parts[1, :, i] + r_v * parts[2, :, i]
-                if behind_h is not None:
-                    field = behind_h * parts[3, :, i] + behind_v * (parts[0, :, i] - parts[3, :, i])
-                    matrix = np.where(sheet, matrix - field, matrix)
+                if behind is not None:
+                    matrix -= behind[0] * parts[3, :, i] + behind[1] * (parts[0, :, i] - parts[3, :, i])
                 np.multiply(mean, matrix, out=out[first : first + step, :, i])
         return out
+
+    def _coefficients(
+        self, cosine: np.ndarray, eps: np.ndarray, wave: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, list[np.ndarray] | None]:
+        """R_h, R_v, and T_h, T_v of thin sheets, 0 of others, None without sheets: (n frequencies, k) each.
+
+        cosine  (k,);  eps  (n, k);  wave  1/wavelength, 1/m (n, 1)
+        """
+        from .physical_optics import fresnel, slab
+
+        thickness = np.array([m.thickness for m in self.materials])[self.material]
+        sheet, (r_h, r_v) = thickness > 0, fresnel(cosine, eps)
+        if not sheet.any():
+            return r_h, r_v, None
+        of_h, of_v, *through = slab(cosine, np.where(sheet, eps, 2), thickness * wave)
+        return np.where(sheet, of_h, r_h), np.where(sheet, of_v, r_v), [np.where(sheet, t, 0) for t in through]
 
     def planes(self, order: np.ndarray, nodes: np.ndarray, metal: bool, dispersive: bool) -> np.ndarray:
         """Rows of numbers as kernels/spread_facets.cl reads them, float32, in `order`; repeats at its end are blank."""
