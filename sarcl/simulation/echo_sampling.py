@@ -37,8 +37,9 @@ def receiver_positions(track: Trajectory, receiver: Trajectory | None) -> np.nda
 
 
 def warn_of_wide_angles(to_tx: np.ndarray, to_rx: np.ndarray, forward: bool) -> None:
-    """Warn of bistatic angles beyond 90 deg, between directions (n, 3) to the antennas, without forward scatter."""
-    cosine = (to_tx * to_rx).sum(axis=1)
+    """Warn of bistatic angles beyond 90 deg, between vectors (n, 3) to the antennas, without forward scatter."""
+    lengths = np.linalg.norm(to_tx, axis=1) * np.linalg.norm(to_rx, axis=1)
+    cosine = (to_tx * to_rx).sum(axis=1) / np.where(lengths > 0, lengths, 1)
     wide = int((cosine < WIDE).sum())
     if wide and not forward:
         largest = np.degrees(np.arccos(max(float(cosine.min()), -1.0)))

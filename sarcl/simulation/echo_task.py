@@ -9,7 +9,6 @@ import numpy as np
 
 from ..base.errors import NotApplicable
 from ..base.validation import instance
-from ..base.vectors import unit
 from ..model.trajectory import Trajectory
 from ..model.waveform import Waveform
 from ..opencl.device import Device
@@ -72,10 +71,10 @@ def echo_task(scene: Scene, waveform: Waveform, track: Trajectory, options: Echo
     if len(real.triangles):
         if options.shadows:
             refuse_hidden_by_sheets(real)
-        if options.forward:
-            refuse_forward(options, real)
         tx, rx = sends.positions, echo_sampling.receiver_positions(sends, hears)
-        echo_sampling.warn_of_wide_angles(unit(tx - real.center), unit(rx - real.center), options.forward)
+        if options.forward and not np.array_equal(tx, rx):
+            refuse_forward(options, real)
+        echo_sampling.warn_of_wide_angles(tx - real.center, rx - real.center, options.forward)
     weights = antenna_weights.weights_of(options.antenna, options.radar, sends, hears, waveform, real.center)
     return EchoTask(
         options=options,
@@ -104,6 +103,10 @@ def refuse_hidden_by_sheets(scene: Scene) -> None:
 
 def refuse_forward(options: EchoOptions, scene: Scene) -> None:
     """NotApplicable for arrays and surfaces of which forward scatter is not computed."""
+    if options.edges:
+        raise NotApplicable(
+            "forward=True is not computed with edges=True: the waves of edges fade behind a body; take one"
+        )
     if options.array is not None:
         raise NotApplicable("forward=True is for one transmitter and one receiver, not for an array")
     if random(scene).any():

@@ -40,6 +40,7 @@ class EchoKeywords(TypedDict, total=False):
     method: Literal["auto", "direct", "factorized"]
     edges: bool
     crease: float
+    forward: bool
     channels: Literal["simultaneous", "separated"]
     receive: Literal["reference", "own", "all"]
     skip: bool | Collection[EchoSkip]
@@ -175,6 +176,7 @@ class RcsKeywords(TypedDict, total=False):
 
     receiver: tuple[ArrayLike, ArrayLike] | None
     polarization: Polarization | Literal["all"] | Sequence[Polarization]
+    forward: bool
     shadows: bool
     check: bool | None
     tolerance: float
@@ -191,6 +193,7 @@ def echo(
     method: Literal["auto", "direct", "factorized"] = "auto",
     edges: bool = False,
     crease: float = 0.35,
+    forward: bool = False,
     channels: Literal["simultaneous", "separated"] = "simultaneous",
     receive: Literal["reference", "own", "all"] = "reference",
     skip: bool | Collection[EchoSkip] = True,
@@ -228,6 +231,7 @@ def echo(
     method: Literal["auto", "direct", "factorized"] = "auto",
     edges: bool = False,
     crease: float = 0.35,
+    forward: bool = False,
     channels: Literal["simultaneous", "separated"] = "simultaneous",
     receive: Literal["reference", "own", "all"] = "reference",
     skip: bool | Collection[EchoSkip] = True,
@@ -265,6 +269,7 @@ def echo(
     method: Literal["auto", "direct", "factorized"] = "auto",
     edges: bool = False,
     crease: float = 0.35,
+    forward: bool = False,
     channels: Literal["simultaneous", "separated"] = "simultaneous",
     receive: Literal["reference", "own", "all"] = "reference",
     skip: bool | Collection[EchoSkip] = True,
@@ -518,6 +523,7 @@ def rcs(
     *,
     receiver: tuple[ArrayLike, ArrayLike] | None = None,
     polarization: Polarization | Literal["all"] | Sequence[Polarization] = "HH",
+    forward: bool = False,
     shadows: bool = True,
     check: bool | None = None,
     tolerance: float = 0.001,

@@ -78,6 +78,7 @@ def assert_equal(ones, others):
         assert dict(one.report.plan) == dict(other.report.plan)
 
 
+@pytest.mark.filterwarnings("ignore:bistatic angles reach")
 @pytest.mark.parametrize("task", TASKS)
 def test_a_list_has_the_bits_of_single_calls(task):
     scene, tracks, options = TASKS[task]
