@@ -65,9 +65,15 @@ def lit_parts_of(
 ) -> LitParts:
     """Lit parts of the pieces `wanted` (k,), which the facets that they are parts of occlude."""
     scene, given = pieces.scene, pieces.original.triangles
-    facets = FacetPieces(scene.triangles, scene.two_sided, wanted, given, pieces.of)
-    options = {"max_bytes": rule.max_bytes, "margin": rule.margin}
-    return LitParts(device, facets, given, antennas.ends, progress=progress, **options)
+    ground = None if scene.heights is None else facets_on(scene.heights, given)
+    if ground is None:
+        ground = np.zeros(len(given), bool)
+    upper = ground & ~pieces.original.two_sided & (geometry.normals(given)[:, 2] > 0)
+    facets = FacetPieces(scene.triangles, scene.two_sided, wanted, given, pieces.of, upper)
+    most, margin = rule.max_bytes, rule.margin
+    return LitParts(
+        device, facets, given, antennas.ends, max_bytes=most, margin=margin, ground=ground, progress=progress
+    )
 
 
 def illumination_of(

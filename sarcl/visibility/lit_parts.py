@@ -13,7 +13,7 @@ from ..base.constants import EDGE_ON
 from ..base.vectors import dot, unit
 from ..opencl.choose_device import with_float64
 from ..opencl.device import Device
-from ..scene.triangles import areas
+from ..scene.triangles import areas, normals
 from ._aspect_blocks import pulse_blocks, shadow_length
 from ._certain_shadows import MISSED
 from ._clipping import TOGETHER, Clipper, Receivers
@@ -63,6 +63,7 @@ class FacetPieces:
     two_sided  (k,) bool: the others are left out where they face away;  wanted  (k,) bool: the others are not computed
     given      facets, m (m, 3, 3), of which the pieces are parts, and  of  which (k,). What antennas see of these is
                computed first, and then of the pieces of those that are not seen whole
+    on_ground  (m,) bool: given facets whose upper side alone reflects, of a complete terrain below all antennas
     """
 
     triangles: np.ndarray
@@ -70,12 +71,13 @@ class FacetPieces:
     wanted: np.ndarray
     given: np.ndarray
     of: np.ndarray
+    on_ground: np.ndarray
 
     @classmethod
     def uncut(cls, triangles: np.ndarray, two_sided: np.ndarray) -> FacetPieces:
         """Facets that are not cut, all of them wanted."""
         k = len(triangles)
-        return cls(triangles, two_sided, np.ones(k, bool), triangles, np.arange(k))
+        return cls(triangles, two_sided, np.ones(k, bool), triangles, np.arange(k), np.zeros(k, bool))
 
 
 def _largest(values: np.ndarray) -> np.ndarray:
@@ -101,9 +103,11 @@ class LitParts:
         *,
         max_bytes: float,
         margin: float = 0.0,
+        ground: np.ndarray | bool = False,
         progress: Callable[[int, int], object] | None = None,
     ) -> None:
         """ends  positions of the transmitter, and of a receiver elsewhere, m (n_pulses, 3) each
+        ground  (n,) bool: occluders that are all facets of a complete terrain below the antennas
         max_bytes  on the device;  margin  m: antennas asked for later stand up to this far from `ends`
         progress  called as progress(pulse, pulses)
         """
@@ -113,11 +117,16 @@ class LitParts:
         self._origin = bounds.mean(axis=0)
         self._on_plane = ON_PLANE * float(np.linalg.norm(bounds[1] - bounds[0]))
         keep = np.flatnonzero(pieces.wanted & (areas(triangles) > 0))
-        self._bounds, self._occluders = bounds, occluders[areas(occluders) > 0]
+        solid = areas(occluders) > 0
+        self._bounds, self._occluders = bounds, occluders[solid]
+        upward = np.where(np.broadcast_to(ground, len(solid))[solid, None], normals(self._occluders), 0.0)
+        self._upward = upward * np.sign(upward[:, 2:])  # normals of the ground, 0 of other occluders
         self._clipper = Clipper(with_float64(device), self._occluders, self._origin, self._on_plane, max_bytes)
-        self._pieces = Receivers(keep, triangles[keep], two_sided[keep])
+        self._pieces = Receivers(keep, triangles[keep], two_sided[keep], pieces.on_ground[of[keep]])
         self._parent, first = np.unique(of[keep], return_index=True)
-        parents = Receivers(self._parent, pieces.given[self._parent], two_sided[keep][first])
+        parents = Receivers(
+            self._parent, pieces.given[self._parent], two_sided[keep][first], pieces.on_ground[self._parent]
+        )
         self._child = np.searchsorted(self._parent, of[keep])  # the parent of each piece
         self._cut = len(parents.index) < len(keep)
         self._blocks: list[_Block] = []
@@ -220,7 +229,7 @@ class LitParts:
         back = r.two_sided & np.all([c < away_by for c in cosines], axis=0)
         seen, level = np.flatnonzero(front | back), dot(r.normal, r.center - self._origin)
 
-        def found(at: np.ndarray) -> np.ndarray:
+        def found(at: np.ndarray) -> Iterator[np.ndarray]:
             ahead = at - r.center
             distance = np.sqrt(dot(ahead, ahead))
             look = ahead / distance[:, None]
@@ -230,25 +239,33 @@ class LitParts:
             # by what a direction to the antenna differs from `look`, anywhere on the facet and at any pulse
             astray = turn + radius / np.maximum(distance - radius, 1e-300)
 
-            def casts(pairs: np.ndarray) -> np.ndarray:
-                which = seen[pairs[:, 0]]
-                heights = np.einsum("ncj,nj->nc", about[pairs[:, 1]], r.normal[which]) - level[which, None]
+            def casts(which: np.ndarray, casters: np.ndarray) -> np.ndarray:
+                heights = np.einsum("ncj,nj->nc", about[casters], r.normal[which]) - level[which, None]
                 above, below = _largest(heights) > self._on_plane, -_largest(-heights) < -self._on_plane
                 shading = np.flatnonzero((front[which] & above) | (back[which] & below))
-                which, casters = which[shading], pairs[shading, 1]
+                which, casters = which[shading], casters[shading]
                 places = solid[casters] - r.center[which, None]
                 furthest = np.sqrt(_largest(np.einsum("ncj,ncj->nc", places, places))) + radius[which]
                 ahead = _largest(np.einsum("ncj,nj->nc", places, look[which])) - nearest[which]
                 ahead += furthest * astray[which]  # no shadow falls towards the antenna
-                casting = np.zeros(len(pairs), bool)
+                casting = np.zeros(len(heights), bool)
                 casting[shading[ahead > 0]] = True
                 return casting
 
-            return candidate_pairs(r.triangles[seen], solid, at, turn, span.reach, casts)
+            def among(which: np.ndarray, casters: np.ndarray) -> np.ndarray:
+                facets, others = r.triangles[which], solid[casters]
+                pairs = candidate_pairs(
+                    facets, others, at, turn, span.reach, lambda pairs: casts(which[pairs[:, 0]], casters[pairs[:, 1]])
+                )
+                return which[pairs[:, 0]] * len(solid) + casters[pairs[:, 1]]
 
-        found_of = [found(at) for at in antennas]
-        pairs = found_of[0] if len(found_of) == 1 else np.unique(np.concatenate(found_of), axis=0)
-        pairs = np.stack([seen[pairs[:, 0]], some[pairs[:, 1]]], axis=1)
+            # a line of sight that leaves the ground upwards enters it again only where it slopes away from the antenna
+            near = dot(self._upward[some], unit(at - solid[:, 0])) > turn
+            yield among(seen, np.flatnonzero(~near))
+            yield among(seen[~r.on_ground[seen]], np.flatnonzero(near))
+
+        number = np.unique(np.concatenate([part for at in antennas for part in found(at)]))
+        pairs = np.stack([number // len(solid), some[number % len(solid)]], axis=1)
         return np.asarray(pairs[self._clipper.sorted_out(r, pairs, span.antennas, self._margin) != MISSED])
 
     def at(self, first: int, ends: list[np.ndarray], waves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
