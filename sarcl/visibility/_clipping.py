@@ -31,12 +31,12 @@ TOGETHER = 64, 16
 @dataclass(frozen=True, eq=False)
 class Receivers:
     """Facets whose lit part is computed: indices among all (k,), corners, m (k, 3, 3); whether both sides reflect, and
-    whether only the upper side of a complete terrain does (k,) bool."""
+    whether the upper side of a terrain alone does (k,) bool."""
 
     index: np.ndarray
     triangles: np.ndarray
     two_sided: np.ndarray
-    on_ground: np.ndarray
+    upper: np.ndarray
     center: np.ndarray = field(init=False)
     normal: np.ndarray = field(init=False)
 
@@ -46,7 +46,7 @@ class Receivers:
 
     def part(self, some: np.ndarray) -> Receivers:
         """Some of them."""
-        return Receivers(self.index[some], self.triangles[some], self.two_sided[some], self.on_ground[some])
+        return Receivers(self.index[some], self.triangles[some], self.two_sided[some], self.upper[some])
 
     def packed(self, which: np.ndarray, origin: np.ndarray, on_plane: float) -> np.ndarray:
         """Facets `which` as the kernels read them, about `origin` (n, RECEIVER)."""

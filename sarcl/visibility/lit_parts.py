@@ -13,6 +13,8 @@ from ..base.constants import EDGE_ON
 from ..base.vectors import dot, unit
 from ..opencl.choose_device import with_float64
 from ..opencl.device import Device
+from ..scene.scene import Scene
+from ..scene.terrain import above, facets_on
 from ..scene.triangles import areas, normals
 from ._aspect_blocks import pulse_blocks, shadow_length
 from ._certain_shadows import MISSED
@@ -63,7 +65,8 @@ class FacetPieces:
     two_sided  (k,) bool: the others are left out where they face away;  wanted  (k,) bool: the others are not computed
     given      facets, m (m, 3, 3), of which the pieces are parts, and  of  which (k,). What antennas see of these is
                computed first, and then of the pieces of those that are not seen whole
-    on_ground  (m,) bool: given facets whose upper side alone reflects, of a complete terrain below all antennas
+    ground     (n,) bool, or one for all: occluders that make up a complete terrain below all antennas
+    upper      (m,) bool, or one for all: given facets of which the upper side of that terrain alone reflects
     """
 
     triangles: np.ndarray
@@ -71,13 +74,28 @@ class FacetPieces:
     wanted: np.ndarray
     given: np.ndarray
     of: np.ndarray
-    on_ground: np.ndarray
+    ground: np.ndarray | bool = False
+    upper: np.ndarray | bool = False
 
     @classmethod
-    def uncut(cls, triangles: np.ndarray, two_sided: np.ndarray) -> FacetPieces:
+    def uncut(cls, triangles: np.ndarray, two_sided: np.ndarray, **ground: np.ndarray) -> FacetPieces:
         """Facets that are not cut, all of them wanted."""
         k = len(triangles)
-        return cls(triangles, two_sided, np.ones(k, bool), triangles, np.arange(k), np.zeros(k, bool))
+        return cls(triangles, two_sided, np.ones(k, bool), triangles, np.arange(k), **ground)
+
+
+def ground_of(scene: Scene, ends: list[np.ndarray]) -> np.ndarray:
+    """True (k,) for the facets of a scene that make up its terrain: where that is complete, and lies below all
+    antennas, m (n_pulses, 3) each."""
+    on = None
+    if scene.heights is not None and all(above(scene.heights, end).min() >= 0 for end in ends):
+        on = facets_on(scene.heights, scene.triangles)
+    return np.zeros(len(scene.triangles), bool) if on is None else on
+
+
+def upper_sides(scene: Scene, ground: np.ndarray) -> np.ndarray:
+    """True (k,) for facets of the ground (k,) bool of a scene whose upper side alone reflects."""
+    return np.asarray(ground & ~scene.two_sided & (normals(scene.triangles)[:, 2] > 0))
 
 
 def _largest(values: np.ndarray) -> np.ndarray:
@@ -103,11 +121,9 @@ class LitParts:
         *,
         max_bytes: float,
         margin: float = 0.0,
-        ground: np.ndarray | bool = False,
         progress: Callable[[int, int], object] | None = None,
     ) -> None:
         """ends  positions of the transmitter, and of a receiver elsewhere, m (n_pulses, 3) each
-        ground  (n,) bool: occluders that are all facets of a complete terrain below the antennas
         max_bytes  on the device;  margin  m: antennas asked for later stand up to this far from `ends`
         progress  called as progress(pulse, pulses)
         """
@@ -119,14 +135,14 @@ class LitParts:
         keep = np.flatnonzero(pieces.wanted & (areas(triangles) > 0))
         solid = areas(occluders) > 0
         self._bounds, self._occluders = bounds, occluders[solid]
-        upward = np.where(np.broadcast_to(ground, len(solid))[solid, None], normals(self._occluders), 0.0)
+        upward = np.where(np.broadcast_to(pieces.ground, len(solid))[solid, None], normals(self._occluders), 0.0)
         self._upward = upward * np.sign(upward[:, 2:])  # normals of the ground, 0 of other occluders
         self._clipper = Clipper(with_float64(device), self._occluders, self._origin, self._on_plane, max_bytes)
-        self._pieces = Receivers(keep, triangles[keep], two_sided[keep], pieces.on_ground[of[keep]])
+        upper = np.broadcast_to(pieces.upper, len(pieces.given))
+        self._pieces = Receivers(keep, triangles[keep], two_sided[keep], upper[of[keep]])
         self._parent, first = np.unique(of[keep], return_index=True)
-        parents = Receivers(
-            self._parent, pieces.given[self._parent], two_sided[keep][first], pieces.on_ground[self._parent]
-        )
+        sides = two_sided[keep][first], upper[self._parent]
+        parents = Receivers(self._parent, pieces.given[self._parent], *sides)
         self._child = np.searchsorted(self._parent, of[keep])  # the parent of each piece
         self._cut = len(parents.index) < len(keep)
         self._blocks: list[_Block] = []
@@ -262,7 +278,7 @@ class LitParts:
             # a line of sight that leaves the ground upwards enters it again only where it slopes away from the antenna
             near = dot(self._upward[some], unit(at - solid[:, 0])) > turn
             yield among(seen, np.flatnonzero(~near))
-            yield among(seen[~r.on_ground[seen]], np.flatnonzero(near))
+            yield among(seen[~r.upper[seen]], np.flatnonzero(near))
 
         number = np.unique(np.concatenate([part for at in antennas for part in found(at)]))
         pairs = np.stack([number // len(solid), some[number % len(solid)]], axis=1)

@@ -115,7 +115,7 @@ def test_pieces_in_the_middle_of_a_shadow_and_beside_it_are_decided_for_all_puls
     above = of_grid(square + np.array([0, 0, 1.0]))
     track = np.stack([np.linspace(-20, 20, 40), np.full(40, -4e3), np.full(40, 8e3)], axis=1)
     every = np.ones(len(pieces), bool)
-    facets = FacetPieces(pieces, every, every, of_grid(2 * square), of, np.zeros(2, bool))
+    facets = FacetPieces(pieces, every, every, of_grid(2 * square), of)
     parts = LitParts(device, facets, above, [track], max_bytes=1e8)
     clipped, computed = [], Clipper._computed
 

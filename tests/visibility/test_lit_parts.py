@@ -281,8 +281,8 @@ def test_only_slopes_that_face_away_from_an_antenna_shade_a_terrain(device, bist
     if bistatic:
         ends.append(np.array([[-90.0, y, 35.0] for y in (80.0, 82.0, 84.0)]))
     every = np.ones(len(facets), bool)
-    pieces = FacetPieces(facets, ~every, every, facets, np.arange(len(facets)), on_ground)
-    parts = LitParts(device, pieces, facets, ends, max_bytes=1e8, ground=on_ground)
+    pieces = FacetPieces(facets, ~every, every, facets, np.arange(len(facets)), on_ground, on_ground)
+    parts = LitParts(device, pieces, facets, ends, max_bytes=1e8)
     faces = np.all([((end[1] - facets[:, 0]) * normals(facets)).sum(axis=1) > 0 for end in ends], axis=0)
     share = np.where(parts.dark, 0.0, 1.0)
     share[parts.partly] = parts.at(0, ends, np.zeros(0))[0][1]
