@@ -161,21 +161,24 @@ class LitParts:
         few = FEW * n <= len(solid) and n * len(solid) <= MOST_PAIRS
         for outer in self._spans(ends, [max(WIDE, limit) if few else limit for limit in limits]):
             within = [end[outer.first : outer.stop] for end in ends]
-            some, spans = solid, list(self._spans(within, limits, outer.first))
+            casters, spans = solid, list(self._spans(within, limits, outer.first))
             if len(spans) > 2:
-                some = np.unique(self._pairs(parents, outer, solid)[:, 1])
-                spans = list(self._spans(within, self._limits(within, some), outer.first)) if len(some) else [outer]
+                casters = np.unique(self._pairs(parents, outer, solid)[:, 1])
+                if len(casters):
+                    spans = list(self._spans(within, self._limits(within, casters), outer.first))
+                else:
+                    spans = [outer]
             for span in spans:
-                pairs = self._pairs(parents, span, some)
+                pairs = self._pairs(parents, span, casters)
                 if self._cut:
-                    here, _ = self._seen(parents, pairs, span.antennas)
-                    pairs = pairs[here[pairs[:, 0]]]
+                    is_shaded, _ = self._seen(parents, pairs, span.antennas)
+                    pairs = pairs[is_shaded[pairs[:, 0]]]
                 block = _Block(span, pairs, None)
                 pairs = self._pairs_of_pieces(block)
-                here, dark = self._seen(self._pieces, pairs, span.antennas)
+                is_shaded, dark = self._seen(self._pieces, pairs, span.antennas)
                 dark_pulses += dark
-                changing |= here
-                pairs = pairs[here[pairs[:, 0]]]
+                changing |= is_shaded
+                pairs = pairs[is_shaded[pairs[:, 0]]]
                 kept += pairs.nbytes
                 self._blocks.append(replace(block, pairs=pairs if kept <= self.max_bytes else None))
                 if progress:
@@ -183,38 +186,37 @@ class LitParts:
         dark = dark_pulses == len(ends[0])
         self.dark[self._pieces.index], self.partly[self._pieces.index] = dark, changing & ~dark
 
-    def _limits(self, ends: list[np.ndarray], some: np.ndarray) -> list[float]:
-        """Angles, rad, by which each antenna may turn within a block of pulses for which `some` occluders count."""
-        width = float(np.median(np.sqrt(areas(self._occluders[some]))))
+    def _limits(self, ends: list[np.ndarray], casters: np.ndarray) -> list[float]:
+        """Angles, rad, by which each antenna may turn within a block of pulses for which these occluders count."""
+        width = float(np.median(np.sqrt(areas(self._occluders[casters]))))
         return [MOST_TURN * width / max(shadow_length(self._bounds, end), 1e-300) for end in ends]
 
     def _spans(self, ends: list[np.ndarray], limits: list[float], first: int = 0) -> Iterator[_Span]:
         """Pulses from number `first` on, in blocks in each of which antennas turn by no more than limits, rad."""
         blocks, viewpoints, turns = pulse_blocks(ends, self._bounds, limits)
         for (start, stop), viewpoint, turn in zip(blocks.tolist(), viewpoints.tolist(), turns.tolist(), strict=True):
-            at, here = [end[viewpoint] for end in ends], [end[start:stop] for end in ends]
-            reach = max(float(np.linalg.norm(end - one, axis=1).max()) for end, one in zip(here, at, strict=True))
-            yield _Span(
-                first + start, first + stop, at, turn, self._margin + reach, np.stack(here, axis=1) - self._origin
-            )
+            at, places = [end[viewpoint] for end in ends], [end[start:stop] for end in ends]
+            reach = max(float(np.linalg.norm(end - one, axis=1).max()) for end, one in zip(places, at, strict=True))
+            antennas = np.stack(places, axis=1) - self._origin
+            yield _Span(first + start, first + stop, at, turn, self._margin + reach, antennas)
 
     def _seen(self, receivers: Receivers, pairs: np.ndarray, antennas: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Receivers of which some pulse does not see the whole (n,) bool, and how many pulses see nothing of each: of
         those of which some pulse sees a part, too few."""
         which = np.unique(pairs[:, 0])
-        here, dark = np.zeros(len(receivers.index), bool), np.zeros(len(receivers.index), np.int64)
+        is_shaded, dark = np.zeros(len(receivers.index), bool), np.zeros(len(receivers.index), np.int64)
         if self._margin:  # other antennas may see what these do not
-            here[which] = True
-            return here, dark
+            is_shaded[which] = True
+            return is_shaded, dark
         partly = np.zeros(len(receivers.index), bool)
         for first, stop in ((0, 1), (1, len(antennas))):
-            for _, some, share, _ in self._clipper.light(receivers, which, pairs, antennas[first:stop], np.zeros(0)):
-                dark[which[some]] += (share == 0).sum(axis=0)
-                here[which[some]] |= (share < 1).any(axis=0)
-                partly[which[some]] |= ((share > 0) & (share < 1)).any(axis=0)
+            for _, rows, share, _ in self._clipper.light(receivers, which, pairs, antennas[first:stop], np.zeros(0)):
+                dark[which[rows]] += (share == 0).sum(axis=0)
+                is_shaded[which[rows]] |= (share < 1).any(axis=0)
+                partly[which[rows]] |= ((share > 0) & (share < 1)).any(axis=0)
             # the first pulse tells of most: nothing else is asked of these
             which, pairs = which[~partly[which]], pairs[~partly[pairs[:, 0]]]
-        return here, dark
+        return is_shaded, dark
 
     def _pairs_of(self, block: _Block) -> np.ndarray:
         """The pairs of a block, of the pieces that are partly lit."""
@@ -226,14 +228,14 @@ class LitParts:
         if not self._cut:
             return block.parents
         parents = np.unique(block.parents[:, 0])
-        some = np.flatnonzero(np.isin(self._child, parents))
-        pairs = self._pairs(self._pieces.part(some), block.span, np.unique(block.parents[:, 1]))
-        pairs[:, 0] = some[pairs[:, 0]]
+        rows = np.flatnonzero(np.isin(self._child, parents))
+        pairs = self._pairs(self._pieces.part(rows), block.span, np.unique(block.parents[:, 1]))
+        pairs[:, 0] = rows[pairs[:, 0]]
         return pairs
 
-    def _pairs(self, r: Receivers, span: _Span, some: np.ndarray) -> np.ndarray:
-        """Pairs of a receiver and an occluder, of `some`, that may cast a shadow on it from pulses of a span."""
-        antennas, solid = span.at, self._occluders[some]
+    def _pairs(self, r: Receivers, span: _Span, numbers: np.ndarray) -> np.ndarray:
+        """Pairs of a receiver and an occluder, of these numbers, that may cast a shadow on it from pulses of a span."""
+        antennas, solid = span.at, self._occluders[numbers]
         about = solid - self._origin
         away = min(float(np.linalg.norm(at - np.clip(at, *self._bounds))) for at in antennas)
         turn = min(span.turn + 1e-6 + (2 * self._margin / away if away else 2.0) * (self._margin > 0), 2.0)
@@ -276,12 +278,12 @@ class LitParts:
                 return which[pairs[:, 0]] * len(solid) + casters[pairs[:, 1]]
 
             # a line of sight that leaves the ground upwards enters it again only where it slopes away from the antenna
-            near = dot(self._upward[some], unit(at - solid[:, 0])) > turn
+            near = dot(self._upward[numbers], unit(at - solid[:, 0])) > turn
             yield among(seen, np.flatnonzero(~near))
             yield among(seen[~r.upper[seen]], np.flatnonzero(near))
 
-        number = np.unique(np.concatenate([part for at in antennas for part in found(at)]))
-        pairs = np.stack([number // len(solid), some[number % len(solid)]], axis=1)
+        key = np.unique(np.concatenate([part for at in antennas for part in found(at)]))
+        pairs = np.stack([key // len(solid), numbers[key % len(solid)]], axis=1)
         return np.asarray(pairs[self._clipper.sorted_out(r, pairs, span.antennas, self._margin) != MISSED])
 
     def at(self, first: int, ends: list[np.ndarray], waves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -295,16 +297,16 @@ class LitParts:
         share = np.ones((n, len(self._rows)), np.float32)
         mean = np.empty((n, len(self._rows), len(waves)), np.complex64)
         for block in self._blocks:
-            here = slice(max(block.span.first - first, 0), min(block.span.stop - first, n))
-            if here.start < here.stop:
-                antennas = np.stack([end[here] - self._origin for end in ends], axis=1)
+            part = slice(max(block.span.first - first, 0), min(block.span.stop - first, n))
+            if part.start < part.stop:
+                antennas = np.stack([end[part] - self._origin for end in ends], axis=1)
                 # the pairs of a span have been sorted out for all of its pulses
                 together = TOGETHER if block.span.stop - block.span.first > TOGETHER[0] else TOGETHER[1:]
-                for pulses, some, part_share, part_mean in self._clipper.light(
+                for pulses, rows, part_share, part_mean in self._clipper.light(
                     self._pieces, self._rows, self._pairs_of(block), antennas, waves, together
                 ):
-                    share[here][pulses, some] = part_share
-                    mean[here][pulses, some] = part_mean
+                    share[part][pulses, rows] = part_share
+                    mean[part][pulses, rows] = part_mean
         return share, mean
 
     def occluders_at(self, pulse: int, row: int) -> np.ndarray:

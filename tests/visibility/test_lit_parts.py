@@ -69,6 +69,16 @@ def test_the_reference_has_the_areas_of_another_librarys_polygons(seed):
     assert lit_part(facet[0], occluders, antennas, WAVES)[0] == pytest.approx(polygon.area / area, abs=1e-9)
 
 
+@pytest.mark.parametrize("seed", [377, 1258, 2965, 3910, 4643])
+def test_the_reference_leaves_no_negative_share_of_a_facet_that_is_dark(seed):
+    """Under three occluders whose shadows together are the facet: what is left are slivers of rounding."""
+    random = np.random.default_rng(seed)
+    antenna = random.uniform([-3, -3, 2], [3, 3, 20])
+    top = antenna + (FACET[0] - antenna) * random.uniform(0.1, 0.9)
+    fan = np.array([[top[i - 1], top[i], top.mean(axis=0)] for i in range(3)])
+    assert 0 <= lit_part(FACET[0], fan, [antenna], np.zeros(0))[0] < 1e-9
+
+
 ABOVE = [np.array([[0.1, 0.2, 1e4]])]
 
 
