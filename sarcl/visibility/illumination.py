@@ -9,6 +9,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -243,6 +244,19 @@ class IlluminationTask:
     accuracy: float
     max_bytes: float
 
+    @cached_property
+    def _bounds(self) -> np.ndarray:
+        return box_of(self.triangles, *(part.occluders for part in self.occlusions))
+
+    @cached_property
+    def _widths(self) -> list[float]:
+        lengths = [max(shadow_length(self._bounds, end), 1e-300) for end in self.ends]
+        return [projected_width(self.triangles, e[len(e) // 2]) / n for e, n in zip(self.ends, lengths, strict=True)]
+
+    def blocks(self, part: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Blocks of pulses in which shadows move by a part of a facet's width, as of `pulse_blocks`."""
+        return pulse_blocks(self.ends, self._bounds, [part * width for width in self._widths])
+
 
 def lit(
     triangles: np.ndarray,
@@ -295,7 +309,7 @@ def illuminated(
     """Shares of the facets of a task; progress is called as progress(pulse, pulses), of those that are looked from."""
     k, n_pulses = len(task.triangles), len(task.ends[0])
     solver = IlluminationSolver(device, task.triangles, two_sided=task.two_sided, occlusions=task.occlusions)
-    course, viewpoints, errors = _within(task, solver, _MovingShadows.of(task), progress)
+    course, viewpoints, errors = _within(task, solver, progress)
     blocks = blocks_around(viewpoints, n_pulses)
     if not course.ever.any() and not task.beside:
         warn(ALL_DARK)
@@ -309,46 +323,18 @@ def illuminated(
     )  # fmt: skip
 
 
-@dataclass(frozen=True, eq=False)
-class _MovingShadows:
-    """Shadows that move as antennas, `ends`, m (n_pulses, 3) each, pass all that occludes, in the box `bounds` (2, 3).
-
-    widths  rad, by which each antenna turns while shadows move by the width of a facet
-    """
-
-    ends: list[np.ndarray]
-    bounds: np.ndarray
-    widths: list[float]
-
-    @classmethod
-    def of(cls, task: IlluminationTask) -> _MovingShadows:
-        """Shadows on the facets of a task."""
-        ends, bounds = task.ends, box_of(task.triangles, *(part.occluders for part in task.occlusions))
-        middle = [end[len(end) // 2] for end in ends]
-        lengths = [max(shadow_length(bounds, end), 1e-300) for end in ends]
-        widths = [projected_width(task.triangles, at) / length for at, length in zip(middle, lengths, strict=True)]
-        return cls(ends, bounds, widths)
-
-    def blocks(self, part: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Blocks of pulses in which shadows move by a part of a facet's width, as of `pulse_blocks`."""
-        return pulse_blocks(self.ends, self.bounds, [part * width for width in self.widths])
-
-
 def _within(
-    task: IlluminationTask,
-    solver: IlluminationSolver,
-    shadows: _MovingShadows,
-    progress: Callable[[int, int], object] | None,
+    task: IlluminationTask, solver: IlluminationSolver, progress: Callable[[int, int], object] | None
 ) -> tuple[Course, np.ndarray, tuple[float, float, float]]:
     """Looks with an error of at most the task's accuracy, or as many as there are; their pulses (n,); and errors: of
     sampling, of motion, and the accuracy that could have been asked for."""
     power, beside, accuracy = task.power, task.beside, task.accuracy
-    judge, lines, finer, ends = Judge(power, beside), 0, 1.0, shadows.ends
+    judge, lines, finer, ends = Judge(power, beside), 0, 1.0, task.ends
     n_pulses = len(ends[0])
-    _, coarse, _ = shadows.blocks(COARSE)
+    _, coarse, _ = task.blocks(COARSE)
     thinned = float(np.clip(len(coarse) * len(power) / MUCH, 1, COARSEST))
     while True:
-        _, offered, turns = shadows.blocks(finer * task.tolerance)
+        _, offered, turns = task.blocks(finer * task.tolerance)
         # angle by which facets may turn towards an antenna before the next viewpoint; and those that are edge-on to one
         # of two antennas send back a part of their echo (sarcl/scattering/physical_optics.py:lit_share)
         edge_on = 0.0 if len(ends) == 1 else 2 * EDGE_ON

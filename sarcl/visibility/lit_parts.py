@@ -164,10 +164,8 @@ class LitParts:
             casters, spans = solid, list(self._spans(within, limits, outer.first))
             if len(spans) > 2:
                 casters = np.unique(self._pairs(parents, outer, solid)[:, 1])
-                if len(casters):
-                    spans = list(self._spans(within, self._limits(within, casters), outer.first))
-                else:
-                    spans = [outer]
+                limits_of = self._limits(within, casters) if len(casters) else None
+                spans = [outer] if limits_of is None else list(self._spans(within, limits_of, outer.first))
             for span in spans:
                 pairs = self._pairs(parents, span, casters)
                 if self._cut:
