@@ -2,7 +2,7 @@
 // into cells of a perspective view, and a facet is tested against those in the cells that it is seen in.
 //
 //   a sample is hidden where it lies in some occluder's shadow: inside the three planes through the eye and an edge, and
-//   behind the occluder's own plane by more than BEHIND. The last is tested before samples are lifted off their facet, so
+//   behind the occluder's own plane by more than `behind`. The last is tested before samples are lifted off their facet, so
 //   that facets in one plane do not hide one another. On a line of samples each shadow is an interval: the planes'
 //   distances change linearly from d_a + v (d_c - d_a) by (1 - v)(d_b - d_a), d_a, d_b, d_c those of the corners
 //   u = D (x.across)/(D - x.toward),  v = D (x.upward)/(D - x.toward): the perspective view, D the distance of the eye
@@ -25,7 +25,6 @@
 #include "facet_points.clh"
 
 #define SIDE 2e-7f
-#define BEHIND 2e-6f  // a facet, its coplanar neighbours and its twin do not hide it, from whatever side they are seen
 #define EDGE_ON_EYE 1e-6f  // sine, below which an occluder is seen edge-on and casts no shadow
 #define OUTSIDE 1e30f      // offset of a plane that no point is inside of
 
@@ -55,7 +54,7 @@ static inline float4 edge_plane(float3 a, float3 b, float3 c, float3 eye) {
 }
 
 typedef struct {
-    float eye[3], other[3], across[3], upward[3], toward[3], distance, least[2], per_cell[2];
+    float eye[3], other[3], across[3], upward[3], toward[3], distance, least[2], per_cell[2], behind;
     int cells[2];
 } view_numbers;
 
@@ -236,8 +235,8 @@ __kernel void shaded(view_numbers given, __global const float *restrict facet, _
     seen_box t = box_of(given, p, q, r);
     if (!(t.u_most >= 0 && t.v_most >= 0 && t.u_least <= given.cells[0] && t.v_least <= given.cells[1])) return;  // beside all
     // distances from which on a sample is in shadow, a corner of the facet not in the light, and a corner in deep shadow
-    const float4 least = {-SIDE, -SIDE, -SIDE, BEHIND}, touching = {-SIDE, -SIDE, -SIDE, -BEHIND};
-    const float4 deep = {SIDE, SIDE, SIDE, BEHIND};
+    const float4 least = {-SIDE, -SIDE, -SIDE, given.behind}, touching = {-SIDE, -SIDE, -SIDE, -given.behind};
+    const float4 deep = {SIDE, SIDE, SIDE, given.behind};
     int changed = 0, dark = 0, corners = 0, shaded = 0;
     iv bits[GROUPS];
 #pragma unroll
@@ -267,7 +266,7 @@ __kernel void shaded(view_numbers given, __global const float *restrict facet, _
                 shaded |= !any_below(d_a, deep) | !any_below(d_b, deep) | !any_below(d_c, deep);
                 if (dark) break;
                 crossed_plane one = crossing_of(d_a.x, d_b.x, d_c.x, -SIDE), two = crossing_of(d_a.y, d_b.y, d_c.y, -SIDE);
-                crossed_plane three = crossing_of(d_a.z, d_b.z, d_c.z, -SIDE), own = crossing_of(d_a.w, d_b.w, d_c.w, BEHIND);
+                crossed_plane three = crossing_of(d_a.z, d_b.z, d_c.z, -SIDE), own = crossing_of(d_a.w, d_b.w, d_c.w, given.behind);
                 iv all = -1;
 #pragma unroll
                 for (int g = 0; g < GROUPS; g++) {

@@ -27,6 +27,10 @@ _HERE = os.path.dirname(os.path.realpath(str(sys.modules[__name__.partition(".")
 _TOPICS: ContextVar[set[str] | None] = ContextVar("topics", default=None)
 
 
+# first text and number of the warnings of each topic, where they are counted
+_COUNTS: ContextVar[dict[str, tuple[str, int]] | None] = ContextVar("counts", default=None)
+
+
 class SarclWarning(UserWarning):
     """A warning about a result that is correct as it is."""
 
@@ -44,6 +48,22 @@ def warned_once() -> Iterator[None]:
         _TOPICS.reset(token)
 
 
+@contextmanager
+def warned_together(of: str) -> Iterator[None]:
+    """Every topic of `warn` causes one warning when this context ends, with the number of others of it, as `of` these.
+
+    In it `warned_once` holds back what one of them repeats.
+    """
+    token = _COUNTS.set({})
+    try:
+        yield
+    finally:
+        counts = _COUNTS.get() or {}
+        _COUNTS.reset(token)
+        for text, number in counts.values():
+            warn(text if number == 1 else f"{text} (and so of {number - 1} more {of})")
+
+
 def warn(text: str, topic: str = "") -> None:
     """A SarclWarning that points at the line which called the library, however deep inside it is found.
 
@@ -54,6 +74,11 @@ def warn(text: str, topic: str = "") -> None:
         if (topic or text) in said:
             return
         said.add(topic or text)
+    counts = _COUNTS.get()
+    if counts is not None:
+        first, number = counts.get(topic or text, (text, 0))
+        counts[topic or text] = first, number + 1
+        return
     level, frame = 2, sys._getframe(1)
     while frame.f_back and os.path.realpath(frame.f_code.co_filename).startswith(_HERE):
         level, frame = level + 1, frame.f_back

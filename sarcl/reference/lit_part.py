@@ -118,4 +118,4 @@ def lit_part(
             share += part
             about = np.exp(1j * phases.mean(axis=1))
             mean += part * about * triangle_mean(phases[:, 1] - phases[:, 0], phases[:, 2] - phases[:, 0])
-    return share, mean
+    return max(share, 0.0), mean  # areas of slivers may be -1e-17

@@ -121,7 +121,8 @@ class _PlanSearch:
     best   cheapest plan with sums in float32 so far;  exact  that with the fewest facets and sums in float64
     least, least_rounding  best tolerances so far, and those that float32 alone would allow
     turn   error of one H and V per facet at the last edge;  interpolates  whether an edge was short enough but for the
-           interpolation over the band;  rough  pieces of facets without a coherent part, on the host and on a device
+           interpolation over the band;  rough  pieces of facets without a coherent part, on the host and on a device;
+    elsewhere  those that have a plan of their own: what they cost does not depend on this one
     fits  whether the host holds the pieces of the last edge
     """
 
@@ -138,6 +139,7 @@ class _PlanSearch:
         self.over_band = OverBand(view, limits.cell, apart)
         pieces = np.maximum(1.0, PIECES * (self.longest / min(limits.cell, 1e30)) ** 2)
         self.rough = [float(pieces[~mirror & there].sum()) for there in (~limits.on_device, limits.on_device)]
+        self.elsewhere = self.rough[1] if mirror.any() else 0.0
         self.directions = DirectionError(view)
         self.cutting = CuttingError(view, self.directions.steep)
         is_random = scene.roughness.any() or not mirror.any()
@@ -174,7 +176,7 @@ class _PlanSearch:
             self._choose_nodes(edge, gain, error, count)
         else:
             self.least = min(self.least, self._required(gain, error))
-        is_settled = self.best is not None and count > 4 * self.best.n_facets
+        is_settled = self.best is not None and on_host > 4 * (self.best.n_facets - self.elsewhere)
         return limits.cuts and bool(mirror.any()) and not is_settled
 
     def _required(self, gain: float, error: float) -> float:
@@ -204,7 +206,7 @@ class _PlanSearch:
         for power, n in ((power, n) for power in band for n in range(1, MOST_NODES + 1)):
             error = fixed + weights.with_phase(n, band[power])
             self.least = min(self.least, self._required(gain, error))
-            cost = count * (cost_model.FACET + n * per_node)
+            cost = (count - self.elsewhere) * (cost_model.FACET + n * per_node)
             if self._required(gain, error) <= self.tolerance and cost < self.cost:
                 nodes = chebyshev(view.center, view.bandwidth, n)
                 self.cost, self.best = cost, FacetPlan(edge, nodes, error, count, power, gain)

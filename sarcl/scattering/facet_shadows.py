@@ -14,9 +14,9 @@ from ..numerics.pulse_geometry import PulseGeometry
 from ..opencl.device import Device
 from ..scene import triangles as geometry
 from ..scene.scene import Scene
-from ..scene.terrain import Heights, clear_of, facets_on
-from ..visibility.illumination import Illumination, lit
-from ..visibility.lit_parts import ON_PLANE, FacetPieces, LitParts
+from ..scene.terrain import Heights, clear_of
+from ..visibility.illumination import Illumination, IlluminationTask, Occlusion, illuminated
+from ..visibility.lit_parts import ON_PLANE, FacetPieces, LitParts, ground_of, upper_sides
 from ..visibility.swept_shadows import far_slopes, never_shaded
 from .facet_kinds import coherent
 from .facet_plan import FACET_BYTES
@@ -65,10 +65,12 @@ def lit_parts_of(
 ) -> LitParts:
     """Lit parts of the pieces `wanted` (k,), which the facets that they are parts of occlude."""
     scene, given = pieces.scene, pieces.original.triangles
-    facets = FacetPieces(scene.triangles, scene.two_sided, wanted, given, pieces.of)
+    # forward scatter passes through the ground's own body: all of its facets count
+    ground = np.zeros(len(given), bool) if antennas.forward else ground_of(pieces.original, antennas.ends)
+    sides = scene.two_sided, wanted, given, pieces.of, ground, upper_sides(pieces.original, ground)
     return LitParts(
         device,
-        facets,
+        FacetPieces(scene.triangles, *sides),
         given,
         antennas.ends,
         max_bytes=rule.max_bytes,
@@ -142,6 +144,7 @@ class Casters:
     solid  facets that stand on a terrain, or all where there is none, m (n, 3, 3);  floor  the terrain's, m (m, 3, 3)
     hidden_by_floor  facets of the scene that its terrain may hide from an antenna (k,) bool
     heights, on_heights  the terrain, None where there is none, and the facets that lie on it (k,) bool
+    upper       facets of which the upper side of the terrain alone reflects (k,) bool
     far_slopes  facets of the terrain by which it may hide itself, m (n, 3, 3)
     """
 
@@ -150,20 +153,20 @@ class Casters:
     hidden_by_floor: np.ndarray
     heights: Heights | None
     on_heights: np.ndarray
+    upper: np.ndarray
     far_slopes: np.ndarray
 
     @classmethod
     def of(cls, scene: Scene, antennas: PulseGeometry) -> Casters:
         """Those of a scene, its terrain by its facets where it is complete."""
-        on = None if scene.heights is None else facets_on(scene.heights, scene.triangles)
-        if scene.heights is None or on is None:
-            nowhere = np.zeros(len(scene.triangles), bool)
-            return cls(scene.triangles, scene.triangles[:0], nowhere, None, nowhere, scene.triangles[:0])
+        on = ground_of(scene, antennas.ends)
+        if scene.heights is None or not on.any():
+            return cls(scene.triangles, scene.triangles[:0], on, None, on, on, scene.triangles[:0])
         clear = clear_of(scene.heights, scene.triangles, on, antennas.ends)
         floor, casting = scene.triangles[on], scene.triangles[:0]
         if not clear[on].all():
             casting = floor[far_slopes(floor, antennas.ends)]
-        return cls(scene.triangles[~on], floor, ~clear, scene.heights, on, casting)
+        return cls(scene.triangles[~on], floor, ~clear, scene.heights, on, upper_sides(scene, on), casting)
 
     @property
     def hides_any(self) -> bool:
@@ -186,22 +189,17 @@ class Casters:
 
         The pieces are without random heights: displaced along their normals they would occlude their neighbours.
         """
-        ground = (self.floor, self._pieces_hidden_by_floor(pieces, of, antennas)) if len(self.floor) else None
-        return lit(
-            pieces.triangles,
-            antennas.tx,
-            None if antennas.is_monostatic else antennas.rx,
-            two_sided=pieces.two_sided,
-            tolerance=min(FINEST[0], FINEST[1] * rule.accuracy),
-            accuracy=rule.accuracy,
-            weights=pieces.reflectivity**2 * geometry.areas(pieces.triangles),
-            beside=beside,
-            max_bytes=rule.max_bytes,
-            occluders=self.solid,
-            ground=ground,
-            device=device,
-            progress=progress,
+        hidden, upper = self._pieces_hidden_by_floor(pieces, of, antennas), self.upper[of]
+        occlusions = (
+            Occlusion(self.solid, np.ones(len(of), bool)),
+            # lines of sight that leave the ground upwards enter it again through far slopes alone
+            Occlusion(self.far_slopes, hidden & upper, apart=True),
+            Occlusion(self.floor, hidden & ~upper),
         )
+        power = pieces.reflectivity**2 * geometry.areas(pieces.triangles)
+        limits = min(FINEST[0], FINEST[1] * rule.accuracy), rule.accuracy, rule.max_bytes
+        task = IlluminationTask(pieces.triangles, antennas.ends, pieces.two_sided, occlusions, power, beside, *limits)
+        return illuminated(task, device, progress)
 
     def shade(
         self, scene: Scene, facets: np.ndarray, of: np.ndarray, antennas: PulseGeometry

@@ -61,8 +61,8 @@ class AmplitudeSamples:
         cls, positions: np.ndarray, amplitudes: np.ndarray, weights: AntennaWeights, frequency: float
     ) -> AmplitudeSamples:
         """Of points at positions, m (n, 3), with amplitudes (n,)."""
-        some, share = drawn(np.abs(amplitudes) ** 2, POINTS, np.random.default_rng(0))
-        places, own = positions[some], amplitudes[some, None]
+        sample, share = drawn(np.abs(amplitudes) ** 2, POINTS, np.random.default_rng(0))
+        places, own = positions[sample], amplitudes[sample, None]
 
         def seen(by: AntennaWeights, i: int) -> np.ndarray:
             return np.asarray(own * by.weights(places, i, frequency)[:, None])
@@ -109,13 +109,13 @@ class AmplitudeSamples:
                 if v not in at_kept:
                     at_kept[v] = self.amplitudes(kept, v), self._phasors(kept, v, centers)
             for step in sorted({count // 4, count // 2, 3 * count // 4}):
-                here = self.amplitudes(source, first + step)
-                error = np.zeros(here.shape, np.complex128)
+                exact = self.amplitudes(source, first + step)
+                error = np.zeros(exact.shape, np.complex128)
                 for v, weight in zip(near, decimation.filter[row + step].tolist(), strict=True):
                     amplitudes, phasors = at_kept[v]
-                    error += weight * (amplitudes - here) * phasors[:, None]
+                    error += weight * (amplitudes - exact) * phasors[:, None]
                 wrong += float(self.share @ (np.abs(error) ** 2).sum(axis=1))
-                right += typical_power(self.share * (np.abs(here) ** 2).sum(axis=1))
+                right += typical_power(self.share * (np.abs(exact) ** 2).sum(axis=1))
         return SAFETY * float(np.sqrt(wrong / right)) if right else 0.0
 
     def _phasors(self, kept: AntennaWeights, v: int, centers: np.ndarray) -> np.ndarray:

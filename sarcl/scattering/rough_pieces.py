@@ -50,7 +50,7 @@ class RoughPieces:
     cell    m, to which edges are cut, inf: not at all;  seed  of the random surface
     facets  m (k, 3, 3), parts of the scene's facets `of` (k,): large ones in several parts;  counts  of pieces (k,)
     lengths  of the facets' edges, m (k, 3), by which their longest is chosen
-    some    numbers, rising, of the pieces that count (n,); None: all of these facets
+    subset  numbers, rising, of the pieces that count (n,); None: all of these facets
     """
 
     device: Device
@@ -61,13 +61,13 @@ class RoughPieces:
     lengths: np.ndarray
     of: np.ndarray
     counts: np.ndarray
-    some: np.ndarray | None = None
+    subset: np.ndarray | None = None
 
     @classmethod
-    def cut(cls, device: Device, scene: Scene, cell: float, seed: int, some: np.ndarray) -> RoughPieces:
-        """Pieces of some of the facets that are `suited` to a device (k,) bool. MemoryError above 50 million pieces."""
-        of = np.flatnonzero(some)
-        facets = scene.triangles if some.all() else scene.triangles[of]
+    def cut(cls, device: Device, scene: Scene, cell: float, seed: int, is_cut: np.ndarray) -> RoughPieces:
+        """Pieces of facets (k,) bool, which must be `suited` to a device. MemoryError above 50 million pieces."""
+        of = np.flatnonzero(is_cut)
+        facets = scene.triangles if is_cut.all() else scene.triangles[of]
         lengths = edges(facets).T
         longest = lengths.max(axis=1)
         refuse_many(facets, ROUND * cell, MOST_FACETS)
@@ -94,7 +94,7 @@ class RoughPieces:
         return rough if device.info.fp64 and within else np.zeros_like(rough)
 
     def __len__(self) -> int:
-        return int(self.counts.sum(dtype=np.int64)) if self.some is None else len(self.some)
+        return int(self.counts.sum(dtype=np.int64)) if self.subset is None else len(self.subset)
 
     @cached_property
     def bounds(self) -> np.ndarray:
@@ -114,7 +114,7 @@ class RoughPieces:
     def rows(self, index: np.ndarray | slice) -> RoughPieces:
         """All pieces of facets `index` of these, in this order."""
         parts = {name: getattr(self, name)[index] for name in ("facets", "lengths", "of", "counts")}
-        return replace(self, **parts, some=None)
+        return replace(self, **parts, subset=None)
 
     def blocks(self) -> Iterator[tuple[slice, RoughPieces]]:
         """The pieces in parts of about BLOCK, all of each facet in one: numbers of the pieces, and these."""
@@ -123,17 +123,17 @@ class RoughPieces:
             begin = int(ends[first] - self.counts[first])
             stop = int(np.searchsorted(ends, begin + BLOCK)) + 1
             last = int(ends[min(stop, len(ends)) - 1])
-            part, here = self.rows(slice(first, stop)), slice(begin, last)
-            if self.some is not None:
-                here = slice(*np.searchsorted(self.some, [begin, last]).tolist())
-                part = replace(part, some=self.some[here] - begin)
-            if here.start < here.stop:
-                yield here, part
+            part, numbers = self.rows(slice(first, stop)), slice(begin, last)
+            if self.subset is not None:
+                numbers = slice(*np.searchsorted(self.subset, [begin, last]).tolist())
+                part = replace(part, subset=self.subset[numbers] - begin)
+            if numbers.start < numbers.stop:
+                yield numbers, part
             first = stop
 
-    def picked(self, some: np.ndarray) -> RoughPieces:
+    def picked(self, numbers: np.ndarray) -> RoughPieces:
         """Pieces of these numbers, rising, alone."""
-        return self if len(some) == len(self) else replace(self, some=some)
+        return self if len(numbers) == len(self) else replace(self, subset=numbers)
 
     def sampled_cells(self, most: int) -> tuple[Scene, float]:
         """About `most` of the pieces as a scene, drawn with all of their facet, and the number that each represents."""
@@ -142,8 +142,8 @@ class RoughPieces:
         n = int(np.searchsorted(np.cumsum(self.counts[order], dtype=np.int64), most)) + 1
         corners, row = self.rows(order[:n]).corners()
         if len(corners) > most:
-            some = random.choice(len(corners), most, replace=False)
-            corners, row = corners[some], row[some]
+            sample = random.choice(len(corners), most, replace=False)
+            corners, row = corners[sample], row[sample]
         return with_facets(self.scene, corners, self.of[order[row]]), len(self) / len(corners)
 
     def corners(self) -> tuple[np.ndarray, np.ndarray]:
@@ -154,7 +154,7 @@ class RoughPieces:
         kernel = self.device.kernel(KERNELS, "piece_corners")
         self.device.run(kernel, in_groups(n / self.device.info.vector_width), None, n, facets, owners, paths, corners)
         row = np.repeat(np.arange(len(self.counts)), self.counts)
-        return self.device.download(corners, np.empty((n, 3, 3))), row if self.some is None else row[self.some]
+        return self.device.download(corners, np.empty((n, 3, 3))), row if self.subset is None else row[self.subset]
 
     def placed(self, surfaces: np.ndarray, kinds: np.ndarray, stride: int) -> tuple[Any, Any]:
         """Buffers of the centres of pieces, m float64 (3, stride), and of their numbers as spread_facets.cl reads them,
@@ -191,9 +191,9 @@ class RoughPieces:
         n = int(self.counts.sum(dtype=np.int64))
         owners, paths = (self.device.empty(size * n) for size in (4, 8))
         facets = self._walk(1, self.device.upload(starts.astype(np.int32)), owners, owners, paths)
-        if self.some is not None:
+        if self.subset is not None:
             listed = ((owners, np.empty(n, np.int32)), (paths, np.empty(n, np.uint64)))
-            owners, paths = (self.device.upload(self.device.download(*part)[self.some]) for part in listed)
+            owners, paths = (self.device.upload(self.device.download(*part)[self.subset]) for part in listed)
         return facets, owners, paths
 
     def _walk(self, listed: int, *buffers: object) -> object:
@@ -265,9 +265,9 @@ class RoughFacets(FacetSet):
 
     def chosen(self, index: np.ndarray) -> FacetSet:
         """As of FacetSet."""
-        some = index if self.pieces.some is None else self.pieces.some[index]
+        subset = index if self.pieces.subset is None else self.pieces.subset[index]
         return RoughFacets(
-            replace(self.pieces, some=some), self.illumination, self.kept[index] if self.illumination else None
+            replace(self.pieces, subset=subset), self.illumination, self.kept[index] if self.illumination else None
         )
 
     def drawn(self, most: int, random: np.random.Generator) -> tuple[FacetSet, np.ndarray]:
@@ -284,17 +284,17 @@ class RoughFacets(FacetSet):
         ends = np.cumsum(pieces.counts[facets])
         first, sums = ends - pieces.counts[facets], np.concatenate([[0.0], np.cumsum(likely)])
         places = sums[first] + random.random(most) * (sums[ends] - sums[first])
-        some = np.clip(np.searchsorted(sums, places, side="right") - 1, first, ends - 1)
-        return parts.picked(some), 1 / (most * likely[some])
+        sample = np.clip(np.searchsorted(sums, places, side="right") - 1, first, ends - 1)
+        return parts.picked(sample), 1 / (most * likely[sample])
 
     def tiling_numbers(self, nodes: np.ndarray, metal: bool, dispersive: bool) -> tuple[np.ndarray, np.ndarray]:
         """Arguments `surfaces` and `kinds` of `RoughPieces.placed`."""
         scene, of = self.pieces.scene, self.pieces.of
-        _, some, kinds = np.unique(facet_kinds.kinds(scene, of), return_index=True, return_inverse=True)
-        some = of[some]
+        _, example, kinds = np.unique(facet_kinds.kinds(scene, of), return_index=True, return_inverse=True)
+        example = of[example]
         alike = FacetSet(
-            scene.triangles[some], scene.reflectivity[some], scene.two_sided[some], scene.material[some],
-            scene.materials, None, some, np.zeros(len(some), np.complex64),
+            scene.triangles[example], scene.reflectivity[example], scene.two_sided[example], scene.material[example],
+            scene.materials, None, example, np.zeros(len(example), np.complex64),
         )  # fmt: skip
-        rows = np.delete(alike.planes(np.arange(len(some)), nodes, metal, dispersive), [*range(6), 11, 12], axis=0)
-        return np.concatenate([rows, *([scene.roughness[None, some]] if scene.roughness.any() else [])]), kinds
+        rows = np.delete(alike.planes(np.arange(len(example)), nodes, metal, dispersive), [*range(6), 11, 12], axis=0)
+        return np.concatenate([rows, *([scene.roughness[None, example]] if scene.roughness.any() else [])]), kinds

@@ -30,12 +30,14 @@ TOGETHER = 64, 16
 
 @dataclass(frozen=True, eq=False)
 class Receivers:
-    """Facets whose lit part is computed: indices among all (k,), corners, m (k, 3, 3); whether both sides reflect; the
-    number of the body of each (k,), for forward scatter alone."""
+    """Facets whose lit part is computed: indices among all (k,), corners, m (k, 3, 3); whether both sides reflect, and
+    whether the upper side of a terrain alone does (k,) bool; the number of the body of each (k,), for forward scatter
+    alone."""
 
     index: np.ndarray
     triangles: np.ndarray
     two_sided: np.ndarray
+    upper: np.ndarray
     body: np.ndarray | None = None
     center: np.ndarray = field(init=False)
     normal: np.ndarray = field(init=False)
@@ -47,7 +49,7 @@ class Receivers:
     def part(self, some: np.ndarray) -> Receivers:
         """Some of them."""
         body = None if self.body is None else self.body[some]
-        return Receivers(self.index[some], self.triangles[some], self.two_sided[some], body)
+        return Receivers(self.index[some], self.triangles[some], self.two_sided[some], self.upper[some], body)
 
     def packed(self, which: np.ndarray, origin: np.ndarray, on_plane: float) -> np.ndarray:
         """Facets `which` as the kernels read them, about `origin` (n, RECEIVER)."""

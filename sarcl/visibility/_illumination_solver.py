@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,10 +17,20 @@ CHUNK = 2**16  # facets per call of the kernels: bounds the memory
 
 
 @dataclass(frozen=True, eq=False)
+class Occlusion:
+    """Occluders, m (n, 3, 3), the facets that they may hide (k,) bool, and whether none of these lies in the plane of
+    one of the occluders."""
+
+    occluders: np.ndarray
+    hidden: np.ndarray
+    apart: bool = False
+
+
+@dataclass(frozen=True, eq=False)
 class Look:
     """What viewpoints see of facets.
 
-    levels   amplitudes, roots of the shares, uint8 (k,): 255 of a whole facet, 0 where not wanted
+    levels   amplitudes, roots of the shares, uint8 (k,): 255 of a whole facet
     partly   the facets that are partly seen (n,), and `halves`, numbers of their samples that are seen on even and on
              odd lines (n, 2), of `samples` on each of the two
     by_rays  (n,) bool: whether single lines of sight told which are seen, for several samples each, not whole shadows
@@ -44,7 +54,8 @@ class Look:
 
 
 class IlluminationSolver:
-    """A scene on a device, prepared to compute which share of each facet viewpoints see. Arguments as of `lit`."""
+    """A scene on a device, prepared to compute which share of each facet viewpoints see. Arguments as of
+    `IlluminationTask`."""
 
     def __init__(
         self,
@@ -52,26 +63,22 @@ class IlluminationSolver:
         triangles: np.ndarray,
         *,
         two_sided: np.ndarray | bool = True,
-        wanted: np.ndarray | None = None,
-        occluders: np.ndarray | None = None,
-        ground: tuple[np.ndarray, np.ndarray] | None = None,
+        occlusions: Sequence[Occlusion] | None = None,
     ) -> None:
         self.device, k = device, len(triangles)
-        solid = triangles if occluders is None else np.reshape(occluders, (-1, 3, 3))
-        floor, over = (np.zeros((0, 3, 3)), np.zeros(k, bool)) if ground is None else ground
-        self.frame = frame = Frame.around(box_of(triangles, solid, floor))
+        occlusions = (Occlusion(triangles, np.ones(k, bool)),) if occlusions is None else occlusions
+        self.frame = frame = Frame.around(box_of(triangles, *(part.occluders for part in occlusions)))
         self.facets = DeviceFacets(device, triangles, frame, np.broadcast_to(~np.asarray(two_sided), k))
-        keep = np.ones(k, bool) if wanted is None else wanted
-        hiders: list[tuple[Occluders, np.ndarray]] = []  # each with the facets that it may hide
-        for facets, hidden in ((solid, np.ones(k, bool)), (floor, over)):
-            n = int((keep & hidden).sum())
-            if n and len(facets):
-                hiders.append((Occluders(device, facets, frame, n), hidden))
+        hiders = [
+            (Occluders(device, part.occluders, frame, int(part.hidden.sum()), part.apart), part.hidden)
+            for part in occlusions
+            if len(part.occluders) and part.hidden.any()
+        ]
         # facets in parts that share what may hide them
         kind = sum(hidden * 2**i for i, (_, hidden) in enumerate(hiders)) + np.zeros(k, np.int64)
         self._parts = [
-            (np.flatnonzero(keep & (kind == number)), [hider for i, (hider, _) in enumerate(hiders) if number >> i & 1])
-            for number in np.unique(kind[keep]).tolist()
+            (np.flatnonzero(kind == number), [hider for i, (hider, _) in enumerate(hiders) if number >> i & 1])
+            for number in np.unique(kind).tolist()
         ]
         self._few = SampleLines.of_facets(device, FEWEST_LINES)
         self._more = self._few
@@ -81,7 +88,7 @@ class IlluminationSolver:
         self._more = SampleLines.of_facets(self.device, min(n, MOST_LINES))
 
     def share(self, viewpoints: list[np.ndarray], slack: float = 0.0) -> np.ndarray:
-        """Shares of facets that all viewpoints, m (3,), see: uint8 (k,), 255 for a whole facet, 0 where not wanted."""
+        """Shares of facets that all viewpoints, m (3,), see: uint8 (k,), 255 for a whole facet."""
         return np.rint(self.look(viewpoints, slack).levels.astype(np.float32) ** 2 / 255).astype(np.uint8)
 
     def look(self, viewpoints: list[np.ndarray], slack: float = 0.0, some: np.ndarray | None = None) -> Look:

@@ -21,6 +21,9 @@ KERNELS = "light_buffer.cl"
 NEAREST = 1.5  # radii of the scene, from its middle: viewpoints nearer than this see it at angles too wide for a plane
 CELLS, WIDEST = 2**20, 8.0  # cells, of which each occluder has 8 at most, and one at least
 FEWEST, MOST = 16, 2048  # cells along a side
+# Of the scene, by which a sample lies behind an occluder that hides it: a facet, its coplanar neighbours and its twin
+# do not hide it, from whatever side they are seen; of occluders that lie in no facet's plane, what float32 resolves
+BEHIND, RESOLVED = 2e-6, 3e-7
 MOST_ENTRIES = 2**25  # occluders in all cells; with more, cells are made larger
 
 
@@ -28,8 +31,9 @@ class LightBuffer:
     """Facets that occlude others, as one viewpoint sees them; `Occluders` makes it."""
 
     def __init__(
-        self, device: Device, occluders: object, n: int, bounds: np.ndarray, frame: Frame, viewpoint: np.ndarray
-    ) -> None:
+        self, device: Device, occluders: object, n: int, bounds: np.ndarray, frame: Frame, viewpoint: np.ndarray,
+        behind: float = BEHIND,
+    ) -> None:  # fmt: skip
         """occluders  float32 (n, 9) on the device;  bounds  (2, 3) of these, in units of the frame"""
         self.device = device
         exact = (np.asarray(viewpoint, np.float64) - frame.center) * frame.unit
@@ -40,7 +44,13 @@ class LightBuffer:
         seen = (box @ axes.T) * (distance / (distance - box @ toward))[:, None]
         least, size = seen.min(axis=0), np.maximum(np.ptp(seen, axis=0), 1e-6)
         self._fixed: dict[str, Any] = dict(
-            eye=frame.eye(viewpoint)[:3], across=axes[0], upward=axes[1], toward=toward, distance=distance, least=least
+            eye=frame.eye(viewpoint)[:3],
+            across=axes[0],
+            upward=axes[1],
+            toward=toward,
+            distance=distance,
+            least=least,
+            behind=behind,
         )
         self._planes = device.empty(64 * n)
         side = np.sqrt(size.prod() / (n * float(np.clip(CELLS / n, 1.0, WIDEST))))

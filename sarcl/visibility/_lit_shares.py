@@ -19,7 +19,7 @@ from ..scene.scene import Scene
 from ..scene.triangles import centroids, normals
 from ._frame import DevicePoints, Frame
 from ._ray_casting import Occluders
-from .lit_parts import FacetPieces, LitParts
+from .lit_parts import FacetPieces, LitParts, ground_of, upper_sides
 
 AT_ONCE = 64  # pulses whose lit parts are computed together
 FIRST_LOOKS = 9  # pulses from which pixels are looked at first
@@ -54,7 +54,8 @@ def facet_shares(
     opened = open_device(device)
     triangles, out = scene.triangles, np.ones((n, k), np.float32)
     places, normal, one_sided = centroids(triangles), normals(triangles), ~scene.two_sided
-    pieces = FacetPieces.uncut(triangles, scene.two_sided)
+    ground = ground_of(scene, ends)
+    pieces = FacetPieces.uncut(triangles, scene.two_sided, ground=ground, upper=upper_sides(scene, ground))
     parts = LitParts(opened, pieces, triangles, ends, max_bytes=budget(opened, None) / 4)
     for first in range(0, n, AT_ONCE):
         some = slice(first, min(first + AT_ONCE, n))

@@ -8,7 +8,7 @@ from ..base.boxes import box, corners
 from ..opencl.device import Device
 from ._box_tree import BoxTree
 from ._frame import DeviceSamples, Frame
-from ._light_buffer import LightBuffer, sees_from_outside
+from ._light_buffer import BEHIND, RESOLVED, LightBuffer, sees_from_outside
 
 FEW = 100  # occluders of each facet, from which on rays through a tree take less time than to put them into cells
 
@@ -16,11 +16,13 @@ FEW = 100  # occluders of each facet, from which on rays through a tree take les
 class Occluders:
     """Facets on a device, m (k, 3, 3), that occlude others: by cells from viewpoints outside, else by a tree.
 
-    n  of the others; where they are few, a tree that serves every viewpoint takes less time than cells of each
+    n      of the others; where they are few, a tree that serves every viewpoint takes less time than cells of each
+    apart  whether no other facet lies in the plane of one of these
     """
 
-    def __init__(self, device: Device, triangles: np.ndarray, frame: Frame, n: int) -> None:
+    def __init__(self, device: Device, triangles: np.ndarray, frame: Frame, n: int, apart: bool = False) -> None:
         self.device, self.frame, self._few = device, frame, FEW * n < len(triangles)
+        self._behind = RESOLVED if apart else BEHIND
         self._corners = ((triangles - frame.center) * frame.unit).astype(np.float32).reshape(-1, 9)
         self._bounds = box(self._corners.reshape(-1, 3)).astype(np.float64)
         self._radius = float(np.linalg.norm(corners(self._bounds), axis=1).max())
@@ -54,6 +56,7 @@ class Occluders:
         self._views = self._views[-1:]
         if self._uploaded is None:
             self._uploaded = self.device.upload(self._corners)
-        buffer = LightBuffer(self.device, self._uploaded, len(self._corners), self._bounds, self.frame, viewpoint)
+        solid = self._uploaded, len(self._corners), self._bounds
+        buffer = LightBuffer(self.device, *solid, self.frame, viewpoint, self._behind)
         self._views.append((np.array(viewpoint, np.float64), buffer))
         return buffer

@@ -7,8 +7,9 @@ what is interpolated between pulses.
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -17,13 +18,13 @@ from ..base.constants import EDGE_ON
 from ..base.errors import warn
 from ..base.validation import array, flags, ndim, number, sealed
 from ..opencl.choose_device import open_device
-from ..opencl.device import DeviceChoice
+from ..opencl.device import Device, DeviceChoice
 from ..opencl.memory_budget import budget
 from ..scene.triangles import areas
 from ._aspect_blocks import STRIDE, blocks_around, projected_width, pulse_blocks, shadow_length
 from ._facet_samples import MOST_LINES
 from ._frame import box_of
-from ._illumination_solver import IlluminationSolver
+from ._illumination_solver import IlluminationSolver, Occlusion
 from ._levels_along_track import SAMPLING, Course, Judge, Looks, look_along
 from ._lit_shares import facet_shares as facet_shares
 from ._lit_shares import pixel_shares as pixel_shares
@@ -86,7 +87,7 @@ class Illumination:
     dark        (k,) bool: facets of which nothing is illuminated at any viewpoint
     full        (k,) bool: facets that are wholly illuminated at every viewpoint
     changing    (k,) bool: facets whose shares are not the same at every viewpoint
-    dark_facets number of wanted facets of which nothing is illuminated, per block (n_blocks,)
+    dark_facets number of facets of which nothing is illuminated, per block (n_blocks,)
     window      (first, stop): pulses that `spans` and `fraction_at` count from `first`; all other members are of the
                 whole track
     sampling    estimated error of the amplitudes, roots of the shares, relative to their norm: shares from samples
@@ -223,39 +224,62 @@ class Illumination:
 Lighting = Illumination  # a public name
 
 
+@dataclass(frozen=True, eq=False)
+class IlluminationTask:
+    """Facets, m (k, 3, 3), whose shares are asked for, and how accurate these must be; see `lit`.
+
+    ends        one antenna, or two, m (n_pulses, 3) each;  two_sided  (k,) bool
+    occlusions  what occludes, from both sides, and which facets it may hide
+    power       of the facets (k,), 0 or more: weights of the squares of errors;  beside  power, in the same unit, of
+                other facets that every pulse sees whole: the norm is of these too
+    """
+
+    triangles: np.ndarray
+    ends: list[np.ndarray]
+    two_sided: np.ndarray
+    occlusions: Sequence[Occlusion]
+    power: np.ndarray
+    beside: float
+    tolerance: float
+    accuracy: float
+    max_bytes: float
+
+    @cached_property
+    def _bounds(self) -> np.ndarray:
+        return box_of(self.triangles, *(part.occluders for part in self.occlusions))
+
+    @cached_property
+    def _widths(self) -> list[float]:
+        lengths = [max(shadow_length(self._bounds, end), 1e-300) for end in self.ends]
+        return [projected_width(self.triangles, e[len(e) // 2]) / n for e, n in zip(self.ends, lengths, strict=True)]
+
+    def blocks(self, part: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Blocks of pulses in which shadows move by a part of a facet's width, as of `pulse_blocks`."""
+        return pulse_blocks(self.ends, self._bounds, [part * width for width in self._widths])
+
+
 def lit(
     triangles: np.ndarray,
     tx: np.ndarray,
     rx: np.ndarray | None = None,
     *,
     two_sided: np.ndarray | bool = True,
-    wanted: np.ndarray | None = None,
     tolerance: float = 0.25,
     accuracy: float = 0.02,
-    weights: np.ndarray | None = None,
-    beside: float = 0.0,
     max_bytes: float | None = None,
-    occluders: np.ndarray | None = None,
-    ground: tuple[np.ndarray, np.ndarray] | None = None,
     device: DeviceChoice | None = None,
-    progress: Callable[[int, int], object] | None = None,
 ) -> Illumination:
-    """Shares of facets, m (k, 3, 3), that both antennas, m (n_pulses, 3), see, in blocks of pulses.
+    """Shares of facets, m (k, 3, 3), that both antennas, m (n_pulses, 3), see past one another, in blocks of pulses.
 
     rx          default tx
     two_sided   (k,) bool or one for all: the other facets are not illuminated where they face away from an antenna
-    wanted      (k,) bool: facets whose share is computed; the others only occlude, their share is 0
     tolerance   largest change of a share between the pulses of a block, for the facet of median size: shares are
                 computed at one pulse of a block at most; blocks become shorter where the accuracy asks for it
-    accuracy    error of the amplitudes, roots of the shares, relative to their norm: more samples and pulses are taken
-                until it is met, or there are no more; `error` says what was met. See docs/theory/shadows.md
-    weights     powers of the facets (k,) in that norm; default their areas
-    beside      power, in the same unit, of other facets that every pulse sees whole: the norm is of these too
+    accuracy    error of the amplitudes, roots of the shares, relative to their norm, weighted by area: more samples and
+                pulses are taken until it is met, or there are no more; `error` says what was met. See
+                docs/theory/shadows.md
     max_bytes   memory for the shares, default a quarter of that for blocks of `echo`; shares beyond it are computed
                 anew each time they are asked for
-    occluders   m (n, 3, 3): what occludes, from both sides; default the facets
-    ground      m (n, 3, 3), and (k,) bool: what occludes too, but those of the facets alone
-    progress    called as progress(pulse, pulses), of those that are looked from
 
     Warns with SarclWarning where nothing at all is illuminated.
     """
@@ -264,98 +288,53 @@ def lit(
     if not isinstance(triangles, np.ndarray) or triangles.dtype != np.float64 or triangles.shape[1:] != (3, 3):
         triangles = array("triangles", triangles, np.float64, ("k", 3, 3))
     k = len(triangles)
-    if occluders is not None and getattr(occluders, "shape", None) != (0, 3, 3):
-        occluders = array("occluders", occluders, np.float64, ("n", 3, 3))
-    arguments.progress(progress, "progress(pulse, pulses)")
     if max_bytes is not None:
         max_bytes = number("max_bytes", max_bytes, least=0)
     tolerance, accuracy = number("tolerance", tolerance, above=0), number("accuracy", accuracy, above=0)
-    wanted = None if wanted is None else _mask("wanted", wanted, k)
-    two_sided = _mask("two_sided", two_sided, k)
-    power = _powers(weights, triangles) * (1.0 if wanted is None else wanted)
-    if ground is not None:
-        ground = array("ground[0]", ground[0], np.float64, ("n", 3, 3)), _mask("ground[1]", ground[1], k)
-    opened = open_device(device)
+    sides, every, opened = _mask("two_sided", two_sided, k), np.ones(k, bool), open_device(device)
     if max_bytes is None:
         max_bytes = budget(opened, None) / 4
     if k == 0:
         return Illumination.of_nothing(len(tx))
-    solver = IlluminationSolver(
-        opened, triangles, two_sided=two_sided, wanted=wanted, occluders=occluders, ground=ground
+    power = np.asarray(areas(triangles), np.float64)
+    task = IlluminationTask(
+        triangles, ends, sides, (Occlusion(triangles, every),), power, 0.0, tolerance, accuracy, max_bytes
     )
-    casters = [part for part in (occluders, None if ground is None else ground[0]) if part is not None]
-    bounds = box_of(triangles, *casters)
-    shadows = _MovingShadows.of(triangles, bounds, ends)
-    course, viewpoints, errors = _within(accuracy, tolerance, solver, shadows, power, beside, max_bytes, progress)
-    blocks = blocks_around(viewpoints, len(tx))
-    n_wanted = k if wanted is None else int(np.sum(wanted))
-    if not course.ever.any() and n_wanted and not beside:
+    return illuminated(task, opened)
+
+
+def illuminated(
+    task: IlluminationTask, device: Device, progress: Callable[[int, int], object] | None = None
+) -> Illumination:
+    """Shares of the facets of a task; progress is called as progress(pulse, pulses), of those that are looked from."""
+    k, n_pulses = len(task.triangles), len(task.ends[0])
+    solver = IlluminationSolver(device, task.triangles, two_sided=task.two_sided, occlusions=task.occlusions)
+    course, viewpoints, errors = _within(task, solver, progress)
+    blocks = blocks_around(viewpoints, n_pulses)
+    if not course.ever.any() and not task.beside:
         warn(ALL_DARK)
     log.info(
-        "%d pulses in %d blocks; %d of %d facets never illuminated", len(tx), len(blocks), k - course.ever.sum(), k
+        "%d pulses in %d blocks; %d of %d facets never illuminated", n_pulses, len(blocks), k - course.ever.sum(), k
     )
     return Illumination(
         sealed(blocks), sealed(viewpoints), sealed(~course.ever), sealed(course.always), sealed(course.changing),
-        sealed(n_wanted - np.array(course.seen, np.int64)), (0, len(tx)), *errors,
+        sealed(k - np.array(course.seen, np.int64)), (0, n_pulses), *errors,
         sealed(course.usual), course.changes, lambda block: course.looks.again(course.chosen[block]),
     )  # fmt: skip
 
 
-def _powers(weights: np.ndarray | None, triangles: np.ndarray) -> np.ndarray:
-    """Powers of facets, (k,), default their areas; ValueError for negative ones."""
-    if weights is None:
-        return np.asarray(areas(triangles), np.float64)
-    powers = array("weights", weights, np.float64, (len(triangles),)) if len(triangles) else np.zeros(0)
-    if powers.min(initial=0.0) < 0:
-        raise ValueError(f"weights[{powers.argmin()}] is {powers.min():g}; give powers, 0 or more")
-    return powers
-
-
-@dataclass(frozen=True, eq=False)
-class _MovingShadows:
-    """Shadows that move as antennas, `ends`, m (n_pulses, 3) each, pass all that occludes, in the box `bounds` (2, 3).
-
-    widths  rad, by which each antenna turns while shadows move by the width of a facet
-    """
-
-    ends: list[np.ndarray]
-    bounds: np.ndarray
-    widths: list[float]
-
-    @classmethod
-    def of(cls, triangles: np.ndarray, bounds: np.ndarray, ends: list[np.ndarray]) -> _MovingShadows:
-        """Shadows on facets, m (k, 3, 3), of all of them: which are wanted must not move the blocks."""
-        middle = [end[len(end) // 2] for end in ends]
-        lengths = [max(shadow_length(bounds, end), 1e-300) for end in ends]
-        widths = [projected_width(triangles, at) / length for at, length in zip(middle, lengths, strict=True)]
-        return cls(ends, bounds, widths)
-
-    def blocks(self, part: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Blocks of pulses in which shadows move by a part of a facet's width, as of `pulse_blocks`."""
-        return pulse_blocks(self.ends, self.bounds, [part * width for width in self.widths])
-
-
 def _within(
-    accuracy: float,
-    tolerance: float,
-    solver: IlluminationSolver,
-    shadows: _MovingShadows,
-    power: np.ndarray,
-    beside: float,
-    max_bytes: float,
-    progress: Callable[[int, int], object] | None,
+    task: IlluminationTask, solver: IlluminationSolver, progress: Callable[[int, int], object] | None
 ) -> tuple[Course, np.ndarray, tuple[float, float, float]]:
-    """Looks with an error of at most `accuracy`, or as many as there are; their pulses (n,); and errors: of sampling,
-    of motion, and the accuracy that could have been asked for.
-
-    power  of the facets (k,);  beside  of others that are seen whole
-    """
-    judge, lines, finer, ends = Judge(power, beside), 0, 1.0, shadows.ends
+    """Looks with an error of at most the task's accuracy, or as many as there are; their pulses (n,); and errors: of
+    sampling, of motion, and the accuracy that could have been asked for."""
+    power, beside, accuracy = task.power, task.beside, task.accuracy
+    judge, lines, finer, ends = Judge(power, beside), 0, 1.0, task.ends
     n_pulses = len(ends[0])
-    _, coarse, _ = shadows.blocks(COARSE)
+    _, coarse, _ = task.blocks(COARSE)
     thinned = float(np.clip(len(coarse) * len(power) / MUCH, 1, COARSEST))
     while True:
-        _, offered, turns = shadows.blocks(finer * tolerance)
+        _, offered, turns = task.blocks(finer * task.tolerance)
         # angle by which facets may turn towards an antenna before the next viewpoint; and those that are edge-on to one
         # of two antennas send back a part of their echo (sarcl/scattering/physical_optics.py:lit_share)
         edge_on = 0.0 if len(ends) == 1 else 2 * EDGE_ON
@@ -370,7 +349,7 @@ def _within(
             lines = judge.lines(looks.whole(len(offered) // 2, drawn), SAMPLING * accuracy)
         solver.take_lines(lines)
         judge = Judge(power, beside)
-        course = look_along(looks, offered, first, judge, accuracy, max_bytes, progress)
+        course = look_along(looks, offered, first, judge, accuracy, task.max_bytes, progress)
         viewpoints = offered[course.chosen]
         sampling, motion = judge.sampling, judge.motion(viewpoints, course.left)
         # each part has its share of the accuracy

@@ -13,7 +13,9 @@ from ..base.constants import EDGE_ON
 from ..base.vectors import dot, unit
 from ..opencl.choose_device import with_float64
 from ..opencl.device import Device
-from ..scene.triangles import areas
+from ..scene.scene import Scene
+from ..scene.terrain import above, facets_on
+from ..scene.triangles import areas, normals
 from ._aspect_blocks import pulse_blocks, shadow_length
 from ._bodies import bodies_of
 from ._certain_shadows import MISSED
@@ -64,6 +66,8 @@ class FacetPieces:
     two_sided  (k,) bool: the others are left out where they face away;  wanted  (k,) bool: the others are not computed
     given      facets, m (m, 3, 3), of which the pieces are parts, and  of  which (k,). What antennas see of these is
                computed first, and then of the pieces of those that are not seen whole
+    ground     (n,) bool, or one for all: occluders that make up a complete terrain below all antennas
+    upper      (m,) bool, or one for all: given facets of which the upper side of that terrain alone reflects
     """
 
     triangles: np.ndarray
@@ -71,12 +75,28 @@ class FacetPieces:
     wanted: np.ndarray
     given: np.ndarray
     of: np.ndarray
+    ground: np.ndarray | bool = False
+    upper: np.ndarray | bool = False
 
     @classmethod
-    def uncut(cls, triangles: np.ndarray, two_sided: np.ndarray) -> FacetPieces:
+    def uncut(cls, triangles: np.ndarray, two_sided: np.ndarray, **ground: np.ndarray) -> FacetPieces:
         """Facets that are not cut, all of them wanted."""
         k = len(triangles)
-        return cls(triangles, two_sided, np.ones(k, bool), triangles, np.arange(k))
+        return cls(triangles, two_sided, np.ones(k, bool), triangles, np.arange(k), **ground)
+
+
+def ground_of(scene: Scene, ends: list[np.ndarray]) -> np.ndarray:
+    """True (k,) for the facets of a scene that make up its terrain: where that is complete, and lies below all
+    antennas, m (n_pulses, 3) each."""
+    on = None
+    if scene.heights is not None and all(above(scene.heights, end).min() >= 0 for end in ends):
+        on = facets_on(scene.heights, scene.triangles)
+    return np.zeros(len(scene.triangles), bool) if on is None else on
+
+
+def upper_sides(scene: Scene, ground: np.ndarray) -> np.ndarray:
+    """True (k,) for facets of the ground (k,) bool of a scene whose upper side alone reflects."""
+    return np.asarray(ground & ~scene.two_sided & (normals(scene.triangles)[:, 2] > 0))
 
 
 def _largest(values: np.ndarray) -> np.ndarray:
@@ -116,17 +136,22 @@ class LitParts:
         self._origin = bounds.mean(axis=0)
         self._on_plane = ON_PLANE * float(np.linalg.norm(bounds[1] - bounds[0]))
         keep = np.flatnonzero(pieces.wanted & (areas(triangles) > 0))
-        self._bounds, self._occluders = bounds, occluders[areas(occluders) > 0]
+        solid = areas(occluders) > 0
+        self._bounds, self._occluders = bounds, occluders[solid]
+        upward = np.where(np.broadcast_to(pieces.ground, len(solid))[solid, None], normals(self._occluders), 0.0)
+        self._upward = upward * np.sign(upward[:, 2:])  # normals of the ground, 0 of other occluders
         own = others = None
         if forward and len(ends) == 2:
             body = bodies_of(np.concatenate([pieces.given, self._occluders]))
             own, others = body[: len(pieces.given)], body[len(pieces.given) :]
         frame = self._origin, self._on_plane, max_bytes
         self._clipper = Clipper(with_float64(device), self._occluders, *frame, others)
-        self._pieces = Receivers(keep, triangles[keep], two_sided[keep], None if own is None else own[of[keep]])
+        upper = np.broadcast_to(pieces.upper, len(pieces.given))
         self._parent, first = np.unique(of[keep], return_index=True)
-        body_of_parent = None if own is None else own[self._parent]
-        parents = Receivers(self._parent, pieces.given[self._parent], two_sided[keep][first], body_of_parent)
+        bodies = (None, None) if own is None else (own[of[keep]], own[self._parent])
+        self._pieces = Receivers(keep, triangles[keep], two_sided[keep], upper[of[keep]], bodies[0])
+        sides = two_sided[keep][first], upper[self._parent]
+        parents = Receivers(self._parent, pieces.given[self._parent], *sides, bodies[1])
         self._child = np.searchsorted(self._parent, of[keep])  # the parent of each piece
         self._cut = len(parents.index) < len(keep)
         self._blocks: list[_Block] = []
@@ -145,21 +170,22 @@ class LitParts:
         few = FEW * n <= len(solid) and n * len(solid) <= MOST_PAIRS
         for outer in self._spans(ends, [max(WIDE, limit) if few else limit for limit in limits]):
             within = [end[outer.first : outer.stop] for end in ends]
-            some, spans = solid, list(self._spans(within, limits, outer.first))
+            casters, spans = solid, list(self._spans(within, limits, outer.first))
             if len(spans) > 2:
-                some = np.unique(self._pairs(parents, outer, solid)[:, 1])
-                spans = list(self._spans(within, self._limits(within, some), outer.first)) if len(some) else [outer]
+                casters = np.unique(self._pairs(parents, outer, solid)[:, 1])
+                limits_of = self._limits(within, casters) if len(casters) else None
+                spans = [outer] if limits_of is None else list(self._spans(within, limits_of, outer.first))
             for span in spans:
-                pairs = self._pairs(parents, span, some)
+                pairs = self._pairs(parents, span, casters)
                 if self._cut:
-                    here, _ = self._seen(parents, pairs, span.antennas)
-                    pairs = pairs[here[pairs[:, 0]]]
+                    is_shaded, _ = self._seen(parents, pairs, span.antennas)
+                    pairs = pairs[is_shaded[pairs[:, 0]]]
                 block = _Block(span, pairs, None)
                 pairs = self._pairs_of_pieces(block)
-                here, dark = self._seen(self._pieces, pairs, span.antennas)
+                is_shaded, dark = self._seen(self._pieces, pairs, span.antennas)
                 dark_pulses += dark
-                changing |= here
-                pairs = pairs[here[pairs[:, 0]]]
+                changing |= is_shaded
+                pairs = pairs[is_shaded[pairs[:, 0]]]
                 kept += pairs.nbytes
                 self._blocks.append(replace(block, pairs=pairs if kept <= self.max_bytes else None))
                 if progress:
@@ -167,38 +193,37 @@ class LitParts:
         dark = dark_pulses == len(ends[0])
         self.dark[self._pieces.index], self.partly[self._pieces.index] = dark, changing & ~dark
 
-    def _limits(self, ends: list[np.ndarray], some: np.ndarray) -> list[float]:
-        """Angles, rad, by which each antenna may turn within a block of pulses for which `some` occluders count."""
-        width = float(np.median(np.sqrt(areas(self._occluders[some]))))
+    def _limits(self, ends: list[np.ndarray], casters: np.ndarray) -> list[float]:
+        """Angles, rad, by which each antenna may turn within a block of pulses for which these occluders count."""
+        width = float(np.median(np.sqrt(areas(self._occluders[casters]))))
         return [MOST_TURN * width / max(shadow_length(self._bounds, end), 1e-300) for end in ends]
 
     def _spans(self, ends: list[np.ndarray], limits: list[float], first: int = 0) -> Iterator[_Span]:
         """Pulses from number `first` on, in blocks in each of which antennas turn by no more than limits, rad."""
         blocks, viewpoints, turns = pulse_blocks(ends, self._bounds, limits)
         for (start, stop), viewpoint, turn in zip(blocks.tolist(), viewpoints.tolist(), turns.tolist(), strict=True):
-            at, here = [end[viewpoint] for end in ends], [end[start:stop] for end in ends]
-            reach = max(float(np.linalg.norm(end - one, axis=1).max()) for end, one in zip(here, at, strict=True))
-            yield _Span(
-                first + start, first + stop, at, turn, self._margin + reach, np.stack(here, axis=1) - self._origin
-            )
+            at, places = [end[viewpoint] for end in ends], [end[start:stop] for end in ends]
+            reach = max(float(np.linalg.norm(end - one, axis=1).max()) for end, one in zip(places, at, strict=True))
+            antennas = np.stack(places, axis=1) - self._origin
+            yield _Span(first + start, first + stop, at, turn, self._margin + reach, antennas)
 
     def _seen(self, receivers: Receivers, pairs: np.ndarray, antennas: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Receivers of which some pulse does not see the whole (n,) bool, and how many pulses see nothing of each: of
         those of which some pulse sees a part, too few."""
         which = np.unique(pairs[:, 0])
-        here, dark = np.zeros(len(receivers.index), bool), np.zeros(len(receivers.index), np.int64)
+        is_shaded, dark = np.zeros(len(receivers.index), bool), np.zeros(len(receivers.index), np.int64)
         if self._margin:  # other antennas may see what these do not
-            here[which] = True
-            return here, dark
+            is_shaded[which] = True
+            return is_shaded, dark
         partly = np.zeros(len(receivers.index), bool)
         for first, stop in ((0, 1), (1, len(antennas))):
-            for _, some, share, _ in self._clipper.light(receivers, which, pairs, antennas[first:stop], np.zeros(0)):
-                dark[which[some]] += (share == 0).sum(axis=0)
-                here[which[some]] |= (share < 1).any(axis=0)
-                partly[which[some]] |= ((share > 0) & (share < 1)).any(axis=0)
+            for _, rows, share, _ in self._clipper.light(receivers, which, pairs, antennas[first:stop], np.zeros(0)):
+                dark[which[rows]] += (share == 0).sum(axis=0)
+                is_shaded[which[rows]] |= (share < 1).any(axis=0)
+                partly[which[rows]] |= ((share > 0) & (share < 1)).any(axis=0)
             # the first pulse tells of most: nothing else is asked of these
             which, pairs = which[~partly[which]], pairs[~partly[pairs[:, 0]]]
-        return here, dark
+        return is_shaded, dark
 
     def _pairs_of(self, block: _Block) -> np.ndarray:
         """The pairs of a block, of the pieces that are partly lit."""
@@ -210,14 +235,14 @@ class LitParts:
         if not self._cut:
             return block.parents
         parents = np.unique(block.parents[:, 0])
-        some = np.flatnonzero(np.isin(self._child, parents))
-        pairs = self._pairs(self._pieces.part(some), block.span, np.unique(block.parents[:, 1]))
-        pairs[:, 0] = some[pairs[:, 0]]
+        rows = np.flatnonzero(np.isin(self._child, parents))
+        pairs = self._pairs(self._pieces.part(rows), block.span, np.unique(block.parents[:, 1]))
+        pairs[:, 0] = rows[pairs[:, 0]]
         return pairs
 
-    def _pairs(self, r: Receivers, span: _Span, some: np.ndarray) -> np.ndarray:
-        """Pairs of a receiver and an occluder, of `some`, that may cast a shadow on it from pulses of a span."""
-        antennas, solid = span.at, self._occluders[some]
+    def _pairs(self, r: Receivers, span: _Span, numbers: np.ndarray) -> np.ndarray:
+        """Pairs of a receiver and an occluder, of these numbers, that may cast a shadow on it from pulses of a span."""
+        antennas, solid = span.at, self._occluders[numbers]
         about = solid - self._origin
         away = min(float(np.linalg.norm(at - np.clip(at, *self._bounds))) for at in antennas)
         turn = min(span.turn + 1e-6 + (2 * self._margin / away if away else 2.0) * (self._margin > 0), 2.0)
@@ -233,7 +258,7 @@ class LitParts:
             sides = [(fronts[0], r.two_sided & backs[0]), (fronts[1], backs[1])]
         seen, level = np.flatnonzero(sides[0][0] | sides[0][1]), dot(r.normal, r.center - self._origin)
 
-        def found(at: np.ndarray, front: np.ndarray, back: np.ndarray) -> np.ndarray:
+        def found(at: np.ndarray, front: np.ndarray, back: np.ndarray) -> Iterator[np.ndarray]:
             ahead = at - r.center
             distance = np.sqrt(dot(ahead, ahead))
             look = ahead / distance[:, None]
@@ -243,25 +268,34 @@ class LitParts:
             # by what a direction to the antenna differs from `look`, anywhere on the facet and at any pulse
             astray = turn + radius / np.maximum(distance - radius, 1e-300)
 
-            def casts(pairs: np.ndarray) -> np.ndarray:
-                which = seen[pairs[:, 0]]
-                heights = np.einsum("ncj,nj->nc", about[pairs[:, 1]], r.normal[which]) - level[which, None]
+            def casts(which: np.ndarray, casters: np.ndarray) -> np.ndarray:
+                heights = np.einsum("ncj,nj->nc", about[casters], r.normal[which]) - level[which, None]
                 above, below = _largest(heights) > self._on_plane, -_largest(-heights) < -self._on_plane
                 shading = np.flatnonzero((front[which] & above) | (back[which] & below))
-                which, casters = which[shading], pairs[shading, 1]
+                which, casters = which[shading], casters[shading]
                 places = solid[casters] - r.center[which, None]
                 furthest = np.sqrt(_largest(np.einsum("ncj,ncj->nc", places, places))) + radius[which]
                 ahead = _largest(np.einsum("ncj,nj->nc", places, look[which])) - nearest[which]
                 ahead += furthest * astray[which]  # no shadow falls towards the antenna
-                casting = np.zeros(len(pairs), bool)
+                casting = np.zeros(len(heights), bool)
                 casting[shading[ahead > 0]] = True
                 return casting
 
-            return candidate_pairs(r.triangles[seen], solid, at, turn, span.reach, casts)
+            def among(which: np.ndarray, casters: np.ndarray) -> np.ndarray:
+                facets, others = r.triangles[which], solid[casters]
+                pairs = candidate_pairs(
+                    facets, others, at, turn, span.reach, lambda pairs: casts(which[pairs[:, 0]], casters[pairs[:, 1]])
+                )
+                return which[pairs[:, 0]] * len(solid) + casters[pairs[:, 1]]
 
-        found_of = [found(at, *side) for at, side in zip(antennas, sides, strict=True)]
-        pairs = found_of[0] if len(found_of) == 1 else np.unique(np.concatenate(found_of), axis=0)
-        pairs = np.stack([seen[pairs[:, 0]], some[pairs[:, 1]]], axis=1)
+            # a line of sight that leaves the ground upwards enters it again only where it slopes away from the antenna
+            near = dot(self._upward[numbers], unit(at - solid[:, 0])) > turn
+            yield among(seen, np.flatnonzero(~near))
+            yield among(seen[~r.upper[seen]], np.flatnonzero(near))
+
+        found_of = (found(at, *side) for at, side in zip(antennas, sides, strict=True))
+        key = np.unique(np.concatenate([part for parts in found_of for part in parts]))
+        pairs = np.stack([key // len(solid), numbers[key % len(solid)]], axis=1)
         return np.asarray(pairs[self._clipper.sorted_out(r, pairs, span.antennas, self._margin) != MISSED])
 
     def at(self, first: int, ends: list[np.ndarray], waves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -275,16 +309,16 @@ class LitParts:
         share = np.ones((n, len(self._rows)), np.float32)
         mean = np.empty((n, len(self._rows), len(waves)), np.complex64)
         for block in self._blocks:
-            here = slice(max(block.span.first - first, 0), min(block.span.stop - first, n))
-            if here.start < here.stop:
-                antennas = np.stack([end[here] - self._origin for end in ends], axis=1)
+            part = slice(max(block.span.first - first, 0), min(block.span.stop - first, n))
+            if part.start < part.stop:
+                antennas = np.stack([end[part] - self._origin for end in ends], axis=1)
                 # the pairs of a span have been sorted out for all of its pulses
                 together = TOGETHER if block.span.stop - block.span.first > TOGETHER[0] else TOGETHER[1:]
-                for pulses, some, part_share, part_mean in self._clipper.light(
+                for pulses, rows, part_share, part_mean in self._clipper.light(
                     self._pieces, self._rows, self._pairs_of(block), antennas, waves, together
                 ):
-                    share[here][pulses, some] = part_share
-                    mean[here][pulses, some] = part_mean
+                    share[part][pulses, rows] = part_share
+                    mean[part][pulses, rows] = part_mean
         return share, mean
 
     def occluders_at(self, pulse: int, row: int) -> tuple[np.ndarray, np.ndarray | None]:

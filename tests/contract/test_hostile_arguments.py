@@ -58,7 +58,7 @@ FDA = {"f0": 1e10, "spacing": (0.015, 0.015), "frequency_step": (1e4, 2e4), "ret
 CALLS = {
     "lit": (
         illumination.lit, {"triangles": BOX.triangles, "tx": TRACK.positions},
-        "triangles tx rx two_sided wanted tolerance max_bytes occluders device progress",
+        "triangles tx rx two_sided tolerance accuracy max_bytes device",
     ),
     "facet_shares": (illumination.facet_shares, {"scene": BOX, "track": TRACK}, "scene track receiver device progress"),
     "pixel_shares": (

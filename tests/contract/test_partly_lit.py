@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -159,6 +160,23 @@ def test_a_convex_closed_body_has_the_same_echo_without_shadows(seed):
             for shadows in (True, False)
         )
         assert np.linalg.norm(lit - whole) <= 1e-6 * np.linalg.norm(whole)
+
+
+@pytest.mark.parametrize("two_sided", [False, True])
+def test_a_terrain_and_a_house_sunk_in_it_have_the_echo_of_the_same_facets_without_heights(two_sided):
+    """Of a terrain only slopes that face away from an antenna are searched for shadows; of other facets, all are."""
+    axis, slow = np.linspace(-20.0, 20.0, 7), sarcl.Waveform.chirp(center=1e9, bandwidth=30e6, duration=1e-6)
+    scene = sarcl.Scene.from_heights(axis, axis, np.random.default_rng(1).normal(0.0, 2.0, (7, 7)))
+    scene += sarcl.shapes.box((5.0, 7.0, 9.0)).moved((1.0, 2.0, -4.0))
+    scene = replace(scene, two_sided=np.full(len(scene.triangles), two_sided))
+    low, high = (
+        sarcl.Trajectory(np.arange(3), [[x, y, z] for y in (-5e3, 0, 5e3)]) for x, z in ((-3e5, 7e4), (-1e5, 1.2e5))
+    )
+    for receiver in (None, high):
+        options = {"receiver": receiver, "tolerance": 1e-1, "check": False}
+        wanted = sarcl.echo(replace(scene, heights=None), slow, low, **options).samples
+        change, dark = (sarcl.echo(scene, slow, low, shadows=s, **options).samples - wanted for s in (True, False))
+        assert np.linalg.norm(change) < 1e-5 * np.linalg.norm(wanted) < 1e-4 * np.linalg.norm(dark)
 
 
 def test_the_check_recomputes_lit_parts_by_the_reference():

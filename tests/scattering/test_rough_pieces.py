@@ -263,3 +263,18 @@ def test_pieces_of_both_ways_are_all_pieces_of_a_scene(double):
     on_host = ~is_rough[whole.of]
     for name in ("of", "height", "random", "incoherent"):
         assert np.array_equal(getattr(host, name), getattr(whole, name)[on_host])
+
+
+@pytest.mark.parametrize("tolerance", [1e-1, 1e-2])
+def test_smooth_facets_beside_rough_ground_are_cut_as_they_are_alone(tolerance):
+    """Pieces of the ground, which a device cuts by a plan of their own, say nothing of how the others are cut best."""
+    axis = np.linspace(-20, 20, 21)
+    rough = sarcl.Material(eps_r=4.0, conductivity=1e-3, diagram="cos")
+    ground = sarcl.Scene.from_heights(axis, axis, np.zeros((21, 21)), material=rough)
+    box = sarcl.shapes.box((4.0, 2.0, 1.5), material="metal")
+    chirp = sarcl.Waveform.chirp(center=9.6e9, bandwidth=300e6, duration=1e-6)
+    track = sarcl.Trajectory.line(start=(-7e3, -300, 5e3), velocity=(0, 100, 0), prf=4.0, n_pulses=24)
+    options = {"tolerance": tolerance, "shadows": False, "check": False}
+    both, alone = (sarcl.echo(scene, chirp, track, **options).report.plan for scene in (ground + box, box))
+    for name in ("facet edges, m", "frequencies per facet"):
+        assert both[name] == alone[name]

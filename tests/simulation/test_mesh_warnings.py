@@ -36,6 +36,14 @@ def test_once_per_run(verb, options):
     assert len(found) == 1 and "too coarse for the wavelength" in found[0]
 
 
+@pytest.mark.parametrize("verb", [sarcl.echo, functools.partial(sarcl.plan, sarcl.echo)])
+def test_a_list_of_tracks_is_warned_of_once_with_their_number(verb):
+    tracks = [still(*(seen_from(1e4, 0.8, b + a) for a in np.linspace(0, 0.01, 8))) for b in (0.0, 0.5, 1.0)]
+    found = messages(lambda: verb(BALL, CHIRP, tracks, tolerance=1e-2, shadows=False, polarization="all"))
+    assert len(found) == 1 and "too coarse" in found[0] and found[0].endswith("(and so of 2 more tracks)")
+    assert "more tracks" not in messages(lambda: verb(BALL, CHIRP, tracks[:1], tolerance=1e-2, shadows=False))[0]
+
+
 def test_a_topic_is_warned_of_once_and_then_anew():
     def twice():
         with warned_once():

@@ -33,7 +33,7 @@ def pairs_of(seed):
 def states(device, facets, occluders, antennas):
     """State of each facet and the occluder of the same number (n,)."""
     chosen, n = with_float64(device), np.arange(len(facets))
-    packed = Receivers(n, facets, np.ones(len(n), bool)).packed(n, np.zeros(3), ON_PLANE)
+    packed = Receivers(n, facets, *np.ones((2, len(n)), bool)).packed(n, np.zeros(3), ON_PLANE)
     index, solid = chosen.upload(n.astype(np.int32)), chosen.upload(occluders.reshape(-1, 9))
     return certain_shadows(chosen, (chosen.upload(packed), index, index, solid), len(n), antennas)
 

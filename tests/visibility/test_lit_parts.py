@@ -7,6 +7,7 @@ import pytest
 from helpers.lit_cases import lit_polygon
 
 import sarcl
+from sarcl.base.vectors import unit
 from sarcl.reference.lit_part import lit_part
 from sarcl.scene.triangles import normals
 from sarcl.visibility import _shadow_pairs
@@ -18,9 +19,9 @@ TOLERANCE = 2e-7  # float64, stored in float32; also of devices that leave float
 FACET = np.array([[[0, 0, 0], [1, 0, 0], [0, 1, 0]]], float)
 
 
-def lit_parts(device, triangles, occluders, ends, *, two_sided=True, margin=0.0):
+def lit_parts(device, triangles, occluders, ends, *, two_sided=True, **options):
     pieces = FacetPieces.uncut(triangles, np.full(len(triangles), two_sided))
-    return LitParts(device, pieces, occluders, ends, max_bytes=1e8, margin=margin)
+    return LitParts(device, pieces, occluders, ends, max_bytes=1e8, **options)
 
 
 def shares(device, triangles, occluders, ends, **options):
@@ -66,6 +67,16 @@ def test_the_reference_has_the_areas_of_another_librarys_polygons(seed):
     polygon = lit_polygon(facet[0], occluders, antennas)
     area = np.linalg.norm(np.cross(facet[0, 1] - facet[0, 0], facet[0, 2] - facet[0, 0])) / 2
     assert lit_part(facet[0], occluders, antennas, WAVES)[0] == pytest.approx(polygon.area / area, abs=1e-9)
+
+
+@pytest.mark.parametrize("seed", [377, 1258, 2965, 3910, 4643])
+def test_the_reference_leaves_no_negative_share_of_a_facet_that_is_dark(seed):
+    """Under three occluders whose shadows together are the facet: what is left are slivers of rounding."""
+    random = np.random.default_rng(seed)
+    antenna = random.uniform([-3, -3, 2], [3, 3, 20])
+    top = antenna + (FACET[0] - antenna) * random.uniform(0.1, 0.9)
+    fan = np.array([[top[i - 1], top[i], top.mean(axis=0)] for i in range(3)])
+    assert 0 <= lit_part(FACET[0], fan, [antenna], np.zeros(0))[0] < 1e-9
 
 
 ABOVE = [np.array([[0.1, 0.2, 1e4]])]
@@ -267,6 +278,35 @@ def test_an_edge_under_more_shadows_than_are_listed_at_once(device):
         wanted, integral = lit_part(FACET[0], occluders, [ends[0][pulse]], WAVES, parts.on_plane)
         assert share[pulse, 0] == pytest.approx(wanted, abs=TOLERANCE)
         np.testing.assert_allclose(mean[pulse, 0], integral, atol=TOLERANCE)
+
+
+@pytest.mark.parametrize("bistatic", [False, True])
+def test_only_slopes_that_face_away_from_an_antenna_shade_a_terrain(device, bistatic):
+    """Hills with a house sunk in them, from low antennas: the shadows of every facet, clipped one by one."""
+    axis = np.linspace(-15.0, 15.0, 6)
+    hills = sarcl.Scene.from_heights(axis, axis, np.random.default_rng(3).normal(0.0, 2.0, (6, 6))).triangles
+    facets = np.concatenate([hills, sarcl.shapes.box((5.0, 7.0, 9.0)).moved((1.0, 2.0, -4.0)).triangles])
+    on_ground = np.arange(len(facets)) < len(hills)
+    ends = [np.array([[-150.0, y, 40.0] for y in (-9.0, 0.0, 9.0)])]
+    if bistatic:
+        ends.append(np.array([[-90.0, y, 35.0] for y in (80.0, 82.0, 84.0)]))
+    every = np.ones(len(facets), bool)
+    pieces = FacetPieces(facets, ~every, every, facets, np.arange(len(facets)), on_ground, on_ground)
+    parts = LitParts(device, pieces, facets, ends, max_bytes=1e8)
+    faces = np.all([((end[1] - facets[:, 0]) * normals(facets)).sum(axis=1) > 0 for end in ends], axis=0)
+    share = np.where(parts.dark, 0.0, 1.0)
+    share[parts.partly] = parts.at(0, ends, np.zeros(0))[0][1]
+    antennas = [end[1] for end in ends]
+    wanted = [lit_part(facet, facets, antennas, np.zeros(0), parts.on_plane)[0] for facet in facets[faces]]
+    np.testing.assert_allclose(share[faces], wanted, atol=1e-6)
+    of_ground, of_house = share[faces & on_ground], share[faces & ~on_ground]
+    for shares in (of_ground, of_house):
+        assert ((shares > 0.01) & (shares < 0.99)).any()
+    rows = np.flatnonzero(on_ground[parts.partly])
+    occluders = np.concatenate([parts.occluders_at(1, row) for row in rows])
+    slopes = occluders[(occluders[:, None] == hills).all(axis=(2, 3)).any(axis=1)]
+    cosines = [(unit(end[1] - slopes[:, 0]) * normals(slopes)).sum(axis=1) for end in ends]
+    assert len(slopes) > 20 and np.min(cosines, axis=0).max() < 0.1
 
 
 def test_phase_integrals_of_small_and_of_nearly_equal_phases(device):

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ...base.errors import ToleranceMissed
+from ...base.errors import ToleranceMissed, warned_together
 from ...base.forecast import Forecast, Plan
 from ...base.rows import spread_over
 from ...base.validation import instance
@@ -82,7 +82,8 @@ class EchoesOfTracks:
         """
         n = len(self.tracks)
         sample = spread_over(n, FORECAST)
-        parts = [self.plan_of(i).forecast() for i in sample]
+        with warned_together("tracks"):
+            parts = [self.plan_of(i).forecast() for i in sample]
         lengths = [len(track) for track in self.tracks]
         share = sum(lengths) / sum(lengths[i] for i in sample)
         worst = max(parts, key=lambda part: part.predicted_error)
@@ -102,8 +103,13 @@ class EchoesOfTracks:
     def run(self) -> list[PhaseHistory]:
         """The echoes of all tracks. An exception names the track that it is of, and has the echoes before as `raws`.
 
-        ToleranceMissed of one, or several, is raised when all are finished, with the list of all as its `raws`.
+        ToleranceMissed of one, or several, is raised when all are finished, with the list of all as its `raws`. What is
+        warned of for several tracks is said once, when all are finished.
         """
+        with warned_together("tracks"):
+            return self._all_echoes()
+
+    def _all_echoes(self) -> list[PhaseHistory]:
         files = None
         if self.out is not None:
             tracks = [fingerprint_of(*ends) for ends in zip(self.tracks, self.receivers, strict=True)]
