@@ -12,7 +12,7 @@ from ...numerics import cost_model
 from ...numerics.plan import Plan
 from ...scattering.facets import POLARIZATIONS, FacetSet, diagram_macros, vertical_axes
 from ...scattering.kept_amplitudes import AmplitudeSamples, passes_overhead
-from ..factorized.cells import ScattererCells, scatterers_in_window
+from ..factorized.cells import PlaceSample, ScattererCells, drawn_numbers, scatterers_in_window
 from ..factorized.levels import COSTS_MORE, FEWEST_PULSES, Amplitudes, FactorizedPlan, plan_levels
 from ..factorized.scatterers import Channel, Scatterers
 from ..factorized.spreader import FactorizedSpreader
@@ -110,7 +110,8 @@ class _Case:
         steady = np.flatnonzero(~self.facets.is_changing)
         if len(steady) * len(antennas) < least:
             return "shadows move over too many of the facets"
-        cells = ScattererCells(self.tiled.numbers[0][steady])
+        sample = PlaceSample(len(steady), self.facets.places(steady[drawn_numbers(len(steady))]), self.facets.bounds)
+        cells = ScattererCells(lambda: self.tiled.numbers[0][steady], sample)
         seen = scatterers_in_window(cells, antennas)
         if not seen.all():
             if seen.sum() * len(antennas) < least:
@@ -129,7 +130,9 @@ class _Case:
 
     def _amplitudes(self, numbers: np.ndarray) -> Amplitudes:
         """What the plan must know of facets of these numbers."""
-        view, some = self.view, self.facets.chosen(numbers)
+        view, some = self.view, self.facets
+        if len(numbers) < len(some):
+            some = some.chosen(numbers)
         highest = float(view.frequencies[-1])
         samples = AmplitudeSamples.of_facets(some, view.weights, self._polarizations, view.vertical, highest)
         gain = cost_model.GAIN * view.weights.is_needed

@@ -136,18 +136,17 @@ class PreparedPoints:
             return "planning would take longer than it saves"
         if not forced and not self.device.is_cpu and len(antennas) < cost_model.PULSES_BESIDE_CELLS:
             return "the GPU adds these pulses before the host has made cells"
-        seen = scatterers_in_window(self._cells, antennas)
-        numbers, cells = self._cells.order, self._cells
+        seen, numbers, cells = scatterers_in_window(self._cells, antennas), None, self._cells
         if not seen.all():
-            numbers = numbers[seen]
+            numbers = self._cells.order[seen]
             if len(numbers) * len(antennas) < (1 if forced else cost_model.SEARCH_PAYS):
                 return "too few points lie inside the range window at every pulse"
             cells = ScattererCells(self.points.positions[numbers])
-            numbers = numbers[cells.order]
         samples, leaf = None, 0.0
         if weights.is_needed:
             highest, leaf = band.carrier + band.bandwidth / 2, cost_model.GAIN
-            places, amplitudes = self.points.positions[numbers], self.points.amplitudes[numbers]
+            some = slice(None) if numbers is None else numbers
+            places, amplitudes = self.points.positions[some], self.points.amplitudes[some]
             samples = AmplitudeSamples.of_points(places, amplitudes, weights, highest)
         kind = Amplitudes(lambda leaf: self._image_error(leaf, band), samples, n_nodes, leaf)
         direct = n_nodes * (_direct_cost(band, tolerance, len(self)) + leaf)
@@ -155,10 +154,10 @@ class PreparedPoints:
         plan = plan_levels(cells, antennas, band, tolerance, kind, most=most)
         if isinstance(plan, str):
             return plan
-        if seen.all():
-            return PointPlan(None, (cells, numbers, plan))
+        if numbers is None:
+            return PointPlan(None, (cells, cells.order, plan))
         rest = self._tiled(self._cells.order[~seen])
-        return PointPlan((rest, rest.plan(antennas, band, tolerance)), (cells, numbers, plan))
+        return PointPlan((rest, rest.plan(antennas, band, tolerance)), (cells, numbers[cells.order], plan))
 
     @functools.cached_property
     def _cells(self) -> ScattererCells:
