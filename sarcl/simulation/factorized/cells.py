@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -114,7 +115,7 @@ class ScattererCells:
         return _first(self._sorted[0], depth)
 
     @functools.cached_property
-    def numbers(self) -> np.ndarray:
+    def numbers(self) -> list[float]:
         """About the numbers of cells of each depth that hold points.
 
         Cells that the sample misses are counted from those that hold one and two of it (Chao 1984), and of these the
@@ -127,15 +128,15 @@ class ScattererCells:
             missed = once * (once - 1) / (2 * (twice + 1))
             share = once / max(len(codes) * missed + once, 1)  # of the missed cells, that one more point reaches
             numbers.append(len(counts) + missed * (1 - (1 - share) ** (len(self) - len(codes))))
-        return np.maximum.accumulate(numbers)
+        return np.maximum.accumulate(numbers).tolist()
 
     @functools.cached_property
-    def typical_radii(self) -> np.ndarray:
+    def typical_radii(self) -> list[float]:
         """About the radii, m, of cells of each depth: half the diagonal of a square, or of a cube where cells fill a
         volume."""
-        growth = np.append(1.0, self.numbers[1:] / self.numbers[:-1])
-        edges = float(np.ptp(self.bounds, axis=0).max() or 1.0) / 2.0 ** np.arange(DEEPEST + 1)
-        return np.asarray(edges / 2 * np.sqrt(np.where(growth < PLANAR, 2, 3)))
+        is_flat = [True, *(n < PLANAR * fewer for fewer, n in itertools.pairwise(self.numbers))]
+        edge = float(np.ptp(self.bounds, axis=0).max() or 1.0)
+        return [edge / 2 ** (depth + 1) * (2 if flat else 3) ** 0.5 for depth, flat in enumerate(is_flat)]
 
     def level(self, depth: int) -> CellLevel:
         """The cells of a depth."""

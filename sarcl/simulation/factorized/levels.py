@@ -230,12 +230,10 @@ class _Case:
             n_cells = self.cells.numbers[depth]
             total += n_cells * n_pulses * cost_model.expanding(samples, between.taps, filter_taps)
             n_pulses = n_pulses / ratio + filter_taps
-        total += n_pulses * (
-            len(self.cells) * (cost_model.LEAF_POINT * cost_model.TAPS[spread.taps] + self.amplitudes.leaf)
-            + n_cells
-            * (cost_model.LEAF_ROW + cost_model.LEAF_LANES * self.amplitudes.leaf + cost_model.LEAF_SAMPLE * samples)
-        )
-        total = self.amplitudes.channels * total + self.amplitudes.cell * len(self.cells)
+        lanes = len(self.cells) + cost_model.LEAF_LANES * n_cells
+        lane = cost_model.LEAF_POINT * cost_model.SPREADING.of_taps(spread.taps, 1.0) + self.amplitudes.leaf
+        total += n_pulses * (lanes * lane + n_cells * cost_model.LEAF_SAMPLE * samples)
+        total = self.amplitudes.channels * total + self.amplitudes.cell * len(self.cells) + cost_model.LEVELS
         return total / (len(self.cells) * len(self.antennas))
 
     def build(self, candidate: Candidate) -> FactorizedPlan | str:

@@ -12,8 +12,7 @@ import numpy as np
 from ...base.errors import NotApplicable
 from ...model.waveform import Waveform
 from ...numerics import cost_model
-from ...numerics.interpolator_choice import choose_interpolator
-from ...numerics.plan import Plan, carrier_steps
+from ...numerics.plan import Plan
 from ...numerics.polynomials import lagrange
 from ...numerics.pulse_geometry import PulseGeometry
 from ...opencl.device import Device
@@ -129,28 +128,29 @@ class PreparedPoints:
     def _by_levels(self, weights: AntennaWeights, band: Band, tolerance: float, n_nodes: int) -> PointPlan | str:
         """The factorised plan, or the reason why the direct one is taken."""
         antennas, forced = weights.geometry, self.method == "factorized"
-        pairs = len(self) * len(antennas)
+        gain = cost_model.GAIN if weights.is_needed else 0.0
+        direct = n_nodes * (band.spreading_cost(tolerance, len(self)) + gain)
+        fewest = 1 if forced else cost_model.ECHO_SEARCH_PAYS / (direct * len(antennas))
         if len(antennas) < FEWEST_PULSES:
             return f"the track has {len(antennas)} pulses, and {FEWEST_PULSES} are the fewest that are decimated"
-        if not forced and pairs < cost_model.SEARCH_PAYS:
+        if len(self) < fewest:
             return "planning would take longer than it saves"
         if not forced and not self.device.is_cpu and len(antennas) < cost_model.PULSES_BESIDE_CELLS:
             return "the GPU adds these pulses before the host has made cells"
         seen, numbers, cells = scatterers_in_window(self._cells, antennas), None, self._cells
         if not seen.all():
             numbers = self._cells.order[seen]
-            if len(numbers) * len(antennas) < (1 if forced else cost_model.SEARCH_PAYS):
+            if len(numbers) < fewest:
                 return "too few points lie inside the range window at every pulse"
             cells = ScattererCells(self.points.positions[numbers])
-        samples, leaf = None, 0.0
+        samples = None
         if weights.is_needed:
-            highest, leaf = band.carrier + band.bandwidth / 2, cost_model.GAIN
+            highest = band.carrier + band.bandwidth / 2
             some = slice(None) if numbers is None else numbers
             places, amplitudes = self.points.positions[some], self.points.amplitudes[some]
             samples = AmplitudeSamples.of_points(places, amplitudes, weights, highest)
-        kind = Amplitudes(lambda leaf: self._image_error(leaf, band), samples, n_nodes, leaf)
-        direct = n_nodes * (_direct_cost(band, tolerance, len(self)) + leaf)
-        most = math.inf if forced else cost_model.MERGING_PAYS * direct
+        kind = Amplitudes(lambda leaf: self._image_error(leaf, band), samples, n_nodes, gain)
+        most = math.inf if forced else cost_model.LEVELS_PAY * direct
         plan = plan_levels(cells, antennas, band, tolerance, kind, most=most)
         if isinstance(plan, str):
             return plan
@@ -184,9 +184,3 @@ class PreparedPoints:
         """Error of a plan's kernel, larger where points lie so evenly that its images add up."""
         kernel = plan.interpolator
         return max(kernel.error, self._patches.error(kernel, plan.length, band.n_samples, band.bandwidth))
-
-
-def _direct_cost(band: Band, tolerance: float, n_points: int) -> float:
-    """About the cost of a pair that is added directly, in contributions."""
-    steps = carrier_steps(band.carrier, band.n_samples, band.bandwidth)
-    return choose_interpolator(tolerance, band.n_samples, n_points, steps)[2]
