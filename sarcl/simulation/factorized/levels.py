@@ -143,6 +143,14 @@ def plan_levels(
     return reason
 
 
+def expected_cost(
+    cells: ScattererCells, antennas: PulseGeometry, band: Band, tolerance: float, amplitudes: Amplitudes
+) -> float:
+    """About the cost of the cheapest plan, per pair of scatterer and pulse; infinite where no cells are decimated."""
+    case = _Case(cells, antennas, band, tolerance, amplitudes, math.inf)
+    return min((candidate.cost for candidate in case.candidates()), default=math.inf)
+
+
 class _Case:
     """Points, pulses and a tolerance, with what all candidates share."""
 

@@ -20,7 +20,7 @@ from ...scattering.antenna_weights import AntennaWeights
 from ...scattering.kept_amplitudes import AmplitudeSamples
 from ...scattering.scatterers import Points
 from ..factorized.cells import ScattererCells, scatterers_in_window
-from ..factorized.levels import FEWEST_PULSES, Amplitudes, FactorizedPlan, plan_levels
+from ..factorized.levels import FEWEST_PULSES, Amplitudes, FactorizedPlan, expected_cost, plan_levels
 from ..factorized.scatterers import Channel, Scatterers
 from ..factorized.spreader import FactorizedSpreader
 from ..kernel_images import PatchSamples, sample_patches
@@ -84,6 +84,39 @@ class PointPlan:
         return FactorizedSpreader(device, plan, scatterers, view.antennas, len(view.frequencies), budget)
 
 
+@dataclass(frozen=True, eq=False)
+class PointCosts:
+    """Costs of adding n points of a channel, in contributions per pair of point and pulse.
+
+    gain  of antennas and distances, at each pulse or kept position;  direct  at each pulse
+    fewest  points for which levels are looked for
+    """
+
+    gain: float
+    direct: float
+    fewest: float
+
+    @classmethod
+    def of(cls, n: int, weights: AntennaWeights, band: Band, tolerance: float, n_nodes: int) -> PointCosts:
+        """n_nodes  frequencies at which gains are computed"""
+        gain = cost_model.GAIN if weights.is_needed else 0.0
+        direct = n_nodes * (band.spreading_cost(tolerance, n) + gain)
+        return cls(gain, direct, cost_model.ECHO_SEARCH_PAYS / (direct * len(weights.geometry)))
+
+
+def expected_method(
+    positions: np.ndarray, weights: AntennaWeights, band: Band, tolerance: float, n_nodes: int, device: Device
+) -> tuple[float, bool]:
+    """About the cost per pair of point and pulse of the method that "auto" takes, and whether it is by levels."""
+    antennas, costs = weights.geometry, PointCosts.of(len(positions), weights, band, tolerance, n_nodes)
+    beside_cells = not device.is_cpu and len(antennas) < cost_model.PULSES_BESIDE_CELLS
+    if len(antennas) < FEWEST_PULSES or len(positions) < costs.fewest or beside_cells:
+        return costs.direct, False
+    kind = Amplitudes(lambda leaf: 0.0, None, n_nodes, costs.gain)
+    by_levels = expected_cost(ScattererCells(positions), antennas, band, tolerance, kind)
+    return min(by_levels, costs.direct), by_levels <= cost_model.LEVELS_PAY * costs.direct
+
+
 @dataclass(eq=False)
 class PreparedPoints:
     """Points, and what the plans of all channels share.
@@ -128,9 +161,8 @@ class PreparedPoints:
     def _by_levels(self, weights: AntennaWeights, band: Band, tolerance: float, n_nodes: int) -> PointPlan | str:
         """The factorised plan, or the reason why the direct one is taken."""
         antennas, forced = weights.geometry, self.method == "factorized"
-        gain = cost_model.GAIN if weights.is_needed else 0.0
-        direct = n_nodes * (band.spreading_cost(tolerance, len(self)) + gain)
-        fewest = 1 if forced else cost_model.ECHO_SEARCH_PAYS / (direct * len(antennas))
+        costs = PointCosts.of(len(self), weights, band, tolerance, n_nodes)
+        fewest = 1 if forced else costs.fewest
         if len(antennas) < FEWEST_PULSES:
             return f"the track has {len(antennas)} pulses, and {FEWEST_PULSES} are the fewest that are decimated"
         if len(self) < fewest:
@@ -149,8 +181,8 @@ class PreparedPoints:
             some = slice(None) if numbers is None else numbers
             places, amplitudes = self.points.positions[some], self.points.amplitudes[some]
             samples = AmplitudeSamples.of_points(places, amplitudes, weights, highest)
-        kind = Amplitudes(lambda leaf: self._image_error(leaf, band), samples, n_nodes, gain)
-        most = math.inf if forced else cost_model.LEVELS_PAY * direct
+        kind = Amplitudes(lambda leaf: self._image_error(leaf, band), samples, n_nodes, costs.gain)
+        most = math.inf if forced else cost_model.LEVELS_PAY * costs.direct
         plan = plan_levels(cells, antennas, band, tolerance, kind, most=most)
         if isinstance(plan, str):
             return plan
