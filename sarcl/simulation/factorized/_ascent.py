@@ -117,7 +117,7 @@ class Ascent:
         cells = [level.cells for level in levels]
         self.joins = [_Join.of(device, *pair) for pair in zip([None, *cells], levels, strict=False)]
         self.between = device.upload(plan.between.table)
-        self.spectra_of = SpreadSamples(device, n_samples, plan.leaf.interpolator, length, len(antennas))
+        self.spectra_of = SpreadSamples(device, n_samples, plan.leaf.interpolator, length)
         self.stride = length + 2 * range_profiles.padding(plan.leaf.interpolator)
         per_pulse, room = 24 * self.stride + self.spectra_of.row_bytes, budget / 4
         n_roots, n_pulses = len(levels[0].cells), len(antennas)
