@@ -18,7 +18,8 @@ R_co = TypeVar("R_co", covariant=True)
 class Forecast(Generic[R_co]):
     """Forecast of a verb with the same arguments: `sarcl.plan(verb, ...)` makes it.
 
-    method           such as "direct", "factorized", "polar format", "range-Doppler", "pulse by pulse", "full wave"
+    method           such as "direct", "factorized", "polar format", "range-Doppler", "pulse by pulse", "full wave";
+                     "pulse by pulse or factorized": echoes of facets that the run cuts before it chooses
     plan             details of the plan, as in a report
     seconds          estimated run time at the present speed of the devices
     bytes            estimated memory: of an image all pixels, and the blocks on every device; of echoes their samples

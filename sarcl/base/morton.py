@@ -30,9 +30,12 @@ def order_of_codes(codes: np.ndarray) -> np.ndarray:
     return order
 
 
-def morton_codes(positions: np.ndarray) -> tuple[np.ndarray, float]:
-    """Places of points (n, 3) on the Z curve of the cube that holds them, uint64 (n,), and the edge of that cube, m."""
-    low, high = box(positions)
+def morton_codes(positions: np.ndarray, bounds: np.ndarray | None = None) -> tuple[np.ndarray, float]:
+    """Places of points (n, 3) on the Z curve of the cube that holds them, uint64 (n,), and the edge of that cube, m.
+
+    bounds  m (2, 3), of points among which these are; None: of these
+    """
+    low, high = box(positions) if bounds is None else bounds
     extent = float((high - low).max()) or 1.0
     code = np.empty(len(positions), np.uint64)
     for first in range(0, len(code), BLOCK):

@@ -177,9 +177,7 @@ class RowProfiles:
             buffer, weights = self.pipeline.upload(samples), self.pipeline.upload(self._maker.weights(along))
             return self._maker.make(buffer, samples.dtype, weights, stop - start)
         weights = along[:, None] * self.sample_weight
-        profiles = range_profiles.from_samples(
-            self.device, samples, weights, self.length, self.pad, self.dtype, n_rows=self.task.raw.n_rows
-        )
+        profiles = range_profiles.from_samples(self.device, samples, weights, self.length, self.pad, self.dtype)
         return self.pipeline.upload(profiles)
 
     @property

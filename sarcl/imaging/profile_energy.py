@@ -175,7 +175,7 @@ def _values(
 
     def profiles(weights: np.ndarray | float, begin: int, count: int) -> np.ndarray:
         """Samples begin ... begin + count - 1 about each delay (n, m, count), of rows times weights (n_samples,)."""
-        rows = range_profiles.from_samples(None, samples, weights, length, dtype=np.complex128, n_rows=1)
+        rows = range_profiles.from_samples(None, samples, weights, length, dtype=np.complex128)
         return np.asarray(rows[np.arange(len(rows))[:, None, None], (first + np.arange(begin, begin + count)) % length])
 
     values = (shares * profiles(shaped, 0, kernel.taps)).sum(axis=-1)

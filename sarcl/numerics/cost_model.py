@@ -52,16 +52,20 @@ MERGED_PROFILE = 6.0  # per sample of a range profile
 LEAF = {64: 0.35, 32: 0.45, 16: 0.8}  # per contribution to a leaf tile computed by lines, by its side in pixels
 LEAF_PIXELS = 0.1  # per contribution to a leaf tile computed pixel by pixel, on top of its taps
 
-# Factorised echoes, in contributions (2026-11-26).
-LEAF_POINT = 0.35  # per point and kept pulse of the smallest cells, on top of its taps
-LEAF_ROW, LEAF_SAMPLE = 10.0, 0.2  # per profile of a smallest cell, and per sample of it
+# Factorised echoes, in contributions (2026-11-27): fitted to seconds of single kernels, of 5e4 to 4e5 points in 16 to
+# 3e4 cells and 60 to 400 pulses at tolerances of 1e-2 and 1e-4, over 4.2 ns of a contribution.
+LEAF_POINT = 0.64  # per lane and kept pulse of the smallest cells, times the cost of spreading with its taps
+LEAF_SAMPLE = 0.9  # per sample of a profile of a smallest cell
 LEAF_FACET = 2.5  # per facet, channel and kept pulse: its amplitude
-LEAF_LANES = 8.0  # lanes of a profile's vectors that hold no scatterer, about
-GAIN = 4.0  # per scatterer and kept pulse, or pulse: gains of antennas, spreading loss
-EXPAND_TAP, EXPAND_FILTER_TAP = 0.012, 0.012  # per sample of a cell's profile that is moved to a pulse of a larger cell
-EXPAND_ROW = 24.0  # per such profile
-CELL_POINT = 20.0  # per point: cells and their tables, beyond the tiles of the direct method (2026-11-27)
-CELL_FACET = 200.0  # per facet: the same, and its numbers, which the host sorts (2.0e6 pieces, 2026-11-27)
+LEAF_LANES = 4.0  # lanes of a profile's vectors that hold no scatterer, about
+GAIN = 2.4  # per scatterer and kept pulse, or pulse: gains of antennas, spreading loss
+EXPAND_TAP, EXPAND_FILTER_TAP = 0.025, 0.035  # per sample of a cell's profile that is moved to a pulse of a larger cell
+EXPAND_ROW = 20.0  # per such profile
+CELL_POINT = -15.0  # per point: cells and their tables, beyond the tiles of the direct method, which take longer
+LEVELS_PAY = 0.95  # share of the direct method's cost below which levels are taken: both are known to a tenth
+ECHO_SEARCH_PAYS = 8e6  # cost of the direct method below which the search for levels, 1e6, takes longer than it saves
+LEVELS = 4e6  # search for levels, errors of their decimations, and what any number of scatterers takes on a device
+CELL_FACET = 110.0  # per facet: the same, and its numbers, which the host sorts (3.6e5 to 2.1e6 pieces, 2026-11-27)
 # Pulses that a GPU adds directly while the host makes cells: 0.06 ns per pair, and 0.43 us per point more than tiles of
 # the direct method take (NVIDIA H100).
 PULSES_BESIDE_CELLS = 7400
@@ -91,7 +95,7 @@ GRID_TAP = 0.9  # per sample and cell that it is spread over
 GRID_CELL = 1.0  # per cell and doubling of their number
 
 # Echoes of facets that are added directly, in contributions (2026-11-27).
-FACET_PAIR = 1.3  # per facet, pulse and channel, with amplitudes interpolated between pulse nodes
+FACET_PAIR = 0.76  # per facet, pulse and channel, with amplitudes interpolated between pulse nodes, and two taps
 
 # Echoes of facets, per facet and pulse, in units of the first (2026-11-21).
 FACET = 1.0  # direction, position and polarisations
@@ -143,24 +147,31 @@ class Gathering(NamedTuple):
     range_mode  by range mode of kernels/range_phase.clh; the last, in two float32 parts, on GPUs alone
     wavefront   of L1 per 32 contributions, which pass while instructions do; 0: memory is not counted
     fitted      interpolation kernels have as few terms as their taps allow (interpolation.fitted)
+    missed      per contribution and sample of a profile beyond CACHED_SAMPLES: they are not in a core's nearest cache
     """
 
     taps: tuple[float, float, float, float]
     range_mode: tuple[float, ...]
     wavefront: float = 0.0
     fitted: bool = False
+    missed: float = 0.0
 
-    def of_taps(self, taps: int, oversample: float) -> float:
-        """Cost of so many taps in profiles so many times finer than 1/bandwidth."""
-        return max(self.taps[taps // 2 - 1], self.wavefront * taps * (1 + LINES_APART * oversample))
+    def of_taps(self, taps: int, oversample: float, length: int = 0) -> float:
+        """Cost of so many taps in profiles of `length` samples, so many times finer than 1/bandwidth."""
+        instructions = self.taps[taps // 2 - 1] + self.missed * max(length - CACHED_SAMPLES, 0)
+        return max(instructions, self.wavefront * taps * (1 + LINES_APART * oversample))
 
 
 # Lines of 128 bytes, beyond the first, that a load of a sample for 8 x 4 pixels touches, per unit of oversampling:
 # pixels half a resolution cell apart along the range, eight of them in a row.
 LINES_APART = 0.25
+CACHED_SAMPLES = 4000  # of the four sums of a profile that scatterers are spread into (spread_taps.clh)
 # On a CPU, and from instructions on sm_90 per contribution, on 2026-11-23 (make gpu-static): on GPUs with fast float64,
 # and on GPUs that compute wide numbers in pairs of float32 or with a float64 that is slower than these.
 ON_CPU = Gathering((TAPS[2], TAPS[4], TAPS[6], TAPS[8]), (RANGE_MODE[0], RANGE_MODE[1], RANGE_MODE[2]))
+# Spreading of points on a CPU, from seconds of spread_points.cl for 1.6e7 pairs of 5e4 to 1e6 points and 320 to 16
+# pulses, in profiles of 672 to 10752 samples, on 2026-11-27: 3.9 ns with two taps.
+SPREADING = Gathering((1.0, 1.09, 1.39, 1.53), ON_CPU.range_mode, missed=1e-4)
 ON_GPU = Gathering((1.0, 1.27, 1.6, 2.02), (1.0, 1.36, 3.07, 1.17), 0.088, True)
 ON_GPU_IN_PAIRS = Gathering((1.0, 1.27, 1.6, 2.02), (1.0, 3.98, 14.0, 1.17), 0.088, True)
 

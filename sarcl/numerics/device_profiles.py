@@ -112,11 +112,7 @@ class SpreadSamples:
     Where the device transforms rows, the samples alone are downloaded; on a CPU range_profiles.to_samples makes them.
     """
 
-    def __init__(
-        self, device: Device, n_samples: int, interpolator: Interpolator, length: int, n_rows: int | None = None
-    ) -> None:
-        """n_rows  of the whole job, as `fft.rows` takes it"""
-        self.n_rows = n_rows
+    def __init__(self, device: Device, n_samples: int, interpolator: Interpolator, length: int) -> None:
         self.device, self.n_samples, self.interpolator, self.length = device, n_samples, interpolator, length
         self.pad = range_profiles.padding(interpolator)
         self._batches = Batches(device, length, np.complex64) if possible(device, length, np.complex64) else None
@@ -138,7 +134,7 @@ class SpreadSamples:
             stride = self.length + 2 * self.pad
             profiles = device.download(sums, np.empty((parts, rows, planes, stride), np.complex64))
             total = profiles[:, :, -2:].sum(axis=(0, 2), dtype=np.complex128).astype(np.complex64)
-            return range_profiles.to_samples(device, total, self.n_samples, self.interpolator, self.n_rows)
+            return range_profiles.to_samples(device, total, self.n_samples, self.interpolator)
         fold, cut = (device.kernel("range_profiles.cl", name, **SINGLE) for name in ("fold", "cut"))
         if self._correction is None:
             correction = range_profiles.correction(self.interpolator, self.n_samples, self.length)

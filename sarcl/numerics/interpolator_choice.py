@@ -54,8 +54,8 @@ def _by_cost(
 ) -> tuple[tuple[float, int, float, int], ...]:
     """Cost, taps, oversampling and profile length of every interpolator, the cheapest first."""
     candidates = [
-        (pairs_per_row * gathering.of_taps(taps, oversample) + cost_model.profile(length), taps, oversample, length)
-        for taps, oversample, length in _candidates(n_samples, carrier)
+        (pairs_per_row * gathering.of_taps(*one) + cost_model.profile(one[2]), *one)
+        for one in _candidates(n_samples, carrier)
     ]
     return tuple(sorted(candidates, key=lambda candidate: candidate[0]))
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..base import float_pairs
+from ..base.boxes import corners
 from ..base.constants import SPEED_OF_LIGHT
 from ..base.vectors import unit
 
@@ -111,6 +112,14 @@ class PulseGeometry:
         """Distance of a point (3,) from the nearer limit of each pulse's range window, m (n,); negative outside."""
         delta = self.half_path(point) - self.reference_range
         return np.asarray(np.minimum(delta - self.near, self.far - delta))
+
+    def holds(self, bounds: np.ndarray) -> bool:
+        """Whether a box, m (2, 3), lies in the range window of every pulse: the path over its corners is the longest,
+        and that over the points nearest to the antennas at most the shortest."""
+        shortest = sum(np.linalg.norm(end - np.clip(end, *bounds), axis=1) for end in self.ends) / len(self.ends)
+        longest = half_path(self.tx, self.rx, corners(bounds)[:, None]).max(axis=0)
+        inside = (shortest - self.reference_range >= self.near) & (longest - self.reference_range <= self.far)
+        return bool(inside.all())
 
     def beam_depth(self, points: np.ndarray, rows: Any = slice(None)) -> np.ndarray:
         """Distance of points, m (3,) or (n, 3), from the surface of the beams of pulses `rows`; negative outside.

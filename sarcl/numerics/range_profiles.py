@@ -50,13 +50,11 @@ def from_samples(
     length: int,
     pad: int = 0,
     dtype: type[np.complexfloating] = np.complex64,
-    n_rows: int | None = None,
 ) -> np.ndarray:
     """Profiles (n, length + 2 pad) complex64 or complex128 of samples, each times its weight.
 
     device            computes the FFT; None: the host does
     samples, weights  (n, n_samples), or shapes that broadcast to it
-    n_rows            of the whole job, as `fft.rows` takes it
     Delay 0 stands at pad, with a `correction` among the weights at pad + length/2. The padding repeats the profile's
     other end. ValueError where samples are too large for sums in this number type.
     """
@@ -79,7 +77,7 @@ def from_samples(
             f"samples times weights reach {largest:.1e} in rows of {n_samples}; sums in "
             f"{dtype.__name__} hold up to {limit:.0e}: scale the samples down"
         )
-    transformed = fft.rows(device, within, inverse=True, overwrite=True, n_rows=n_rows)
+    transformed = fft.rows(device, within, inverse=True, overwrite=True)
     if not np.may_share_memory(transformed, within):
         within[:] = transformed
     for start in range(0, pad, length):
@@ -89,19 +87,14 @@ def from_samples(
     return profiles
 
 
-def to_samples(
-    device: Device, profiles: np.ndarray, n_samples: int, interpolator: Interpolator, n_rows: int | None = None
-) -> np.ndarray:
-    """Spectra (n, n_samples) of spread profiles (n, length + 2 padding): the adjoint of `from_samples`.
-
-    n_rows  of the whole job, as `fft.rows` takes it
-    """
+def to_samples(device: Device, profiles: np.ndarray, n_samples: int, interpolator: Interpolator) -> np.ndarray:
+    """Spectra (n, n_samples) of spread profiles (n, length + 2 padding): the adjoint of `from_samples`."""
     pad = padding(interpolator)
     length = profiles.shape[1] - 2 * pad
     folded = profiles[:, pad:-pad].copy()
     folded[:, -pad:] += profiles[:, :pad]
     folded[:, :pad] += profiles[:, -pad:]
-    spectrum = fft.rows(device, folded, n_rows=n_rows)
+    spectrum = fft.rows(device, folded)
     low = n_samples // 2
     # conjugate grids: the sign that centres delay 0 is its own inverse
     samples = np.concatenate([spectrum[:, length - low :], spectrum[:, : n_samples - low]], axis=1)

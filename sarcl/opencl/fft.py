@@ -1,5 +1,4 @@
-"""One FFT of rows: reikna on GPUs; on CPU devices scipy.fft, where reikna is 3 to 20 times slower, and of few rows
-numpy.fft."""
+"""One FFT of rows: reikna on GPUs; on CPU devices that of SciPy, where reikna is 3 to 20 times slower."""
 
 from __future__ import annotations
 
@@ -29,9 +28,6 @@ if TYPE_CHECKING:
 # Multiplications with additions, at the speed of a device's trial, in whose time a launch takes a sample on: an FFT
 # waits for memory, so this is many times what it computes. Launches that take longer make the next batches smaller.
 SAMPLE = 200.0
-# Bytes of all rows of a job up to which numpy.fft transforms them on the host. It takes three times scipy's time for
-# complex64, at most 10 ms here, but importing scipy.fft takes 300 ms. NumPy 1 would compute complex64 in complex128.
-SMALL = 2**22 if np.lib.NumpyVersion(np.__version__) >= "2.0.0" else 0
 
 _turns = threading.Lock()  # a plan's kernels get their arguments before they are enqueued: one thread at a time
 _slow: dict[Device, float] = {}  # samples of a batch whose launches last LASTS, of devices whose launches lasted longer
@@ -54,24 +50,18 @@ def rows(
     inverse: bool = False,
     engine: str | None = None,
     overwrite: bool = False,
-    n_rows: int | None = None,
 ) -> np.ndarray:
     """FFT of every row of complex (n, m) `data`, not normalised in either direction; the type is kept.
 
     device  None: on the host
-    engine  "reikna" or "scipy"; default by the kind of device, and numpy.fft for few rows. complex128 goes to reikna
-            only where rows are a power of two long: for other lengths the error is 1e-16 times the length (measured:
-            9e-12 at 98 304)
+    engine  "reikna" or "scipy"; default by the kind of device. complex128 goes to reikna only where rows are a power
+            of two long: for other lengths the error is 1e-16 times the length (measured: 9e-12 at 98 304)
     overwrite  `data` may be changed, and the result may lie there
-    n_rows     of the whole job, where these are a block of it: blocks of any size get equal bits; None: many
     """
     if engine is None and device is not None and on_device(device, data.shape[1], data.dtype):
         engine = "reikna"
     if device is not None and engine == "reikna":
         return _reikna(device, data, inverse)
-    # norm="forward" puts the 1/m on the other direction: neither call divides
-    if engine is None and n_rows is not None and n_rows * data.shape[1] * data.itemsize <= SMALL:
-        return np.fft.ifft(data, axis=1, norm="forward") if inverse else np.fft.fft(data, axis=1)
     return _scipy_transform()(data, (1,), not inverse, 0, data if overwrite else None, threads())
 
 

@@ -74,6 +74,10 @@ class FacetSet:
         """Box of the centroids, m (2, 3)."""
         return box(centroids(self.triangles))
 
+    def places(self, numbers: np.ndarray) -> np.ndarray:
+        """About the centroids of facets of these numbers, m (n, 3)."""
+        return centroids(self.triangles[numbers])
+
     def roots(self, frequency: float) -> np.ndarray:
         """1/sqrt(eps) of every material at one frequency, complex128; 0 of a perfect conductor."""
         eps = np.array([m.permittivity(frequency) for m in self.materials], np.complex128)

@@ -270,6 +270,14 @@ class RoughFacets(FacetSet):
             replace(self.pieces, subset=subset), self.illumination, self.kept[index] if self.illumination else None
         )
 
+    def places(self, numbers: np.ndarray) -> np.ndarray:
+        """As of FacetSet: random points on the facets that were cut into these pieces."""
+        pieces = self.pieces
+        some = numbers if pieces.some is None else pieces.some[numbers]
+        facets = pieces.facets[np.searchsorted(np.cumsum(pieces.counts, dtype=np.int64), some, side="right")]
+        weights = np.random.default_rng(0).dirichlet((1.0, 1.0, 1.0), len(some))
+        return np.asarray(np.einsum("nc,ncx->nx", weights, facets))
+
     def drawn(self, most: int, random: np.random.Generator) -> tuple[FacetSet, np.ndarray]:
         """Up to `most` pieces, and the number that each represents: as _facet_sampling.py draws them, half of them by
         their areas and half alike; first facets, then a piece of each."""

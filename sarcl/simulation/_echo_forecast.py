@@ -29,7 +29,7 @@ from .echo_output import bytes_of
 from .echo_task import EchoTask
 from .factorized.spreader import FactorizedSpreader
 from .scene_echoes import Added, SceneEchoes
-from .scene_plan import EDGES, SHADOWS, parts_of, samples_shadows
+from .scene_plan import EDGES, SHADOWS, ScenePlan, parts_of, samples_shadows
 from .scene_preparation import warn_of_curves
 from .spectral.spectral_task import spectral_task
 
@@ -58,6 +58,7 @@ def forecast_of(
 
     clock   of planning;  run_of  gives the function that carries out a plan
     plan["contributions"]  about the number of pairs of scatterer, pulse and channel that will be added up
+    plan["method"]  "spread or factorized": of many facets that are not cut yet
     plan["spectral_echo"]  about the seconds of `spectral_echo` instead, or why it refuses or was not planned
     """
     work, shape = EchoWork.of(planned), planned.channels.shape
@@ -75,9 +76,11 @@ def forecast_of(
     spent = sum(clock.seconds.values())
     seconds = spent + estimate.seconds / task.options.speedup(task.devices)
     words = planned.channels.words(planned.method, estimate.words)  # type: ignore[arg-type]
+    if planned.prepared is None:
+        words["method"] = _expected_method(planned.scene, work)
     words |= {"contributions": estimate.contributions, "spectral_echo": _spectral(task, work, seconds)}
     return Forecast(
-        method="factorized" if words.get("method") == "factorized" else "pulse by pulse",
+        method=str(words.get("method", "spread")).replace("spread", "pulse by pulse"),
         plan=words,
         seconds=seconds,
         bytes=bytes_of(shape),
@@ -88,6 +91,18 @@ def forecast_of(
         planning=spent,
         run=run_of(planned),
     )
+
+
+def _expected_method(scene: ScenePlan, work: EchoWork) -> str:
+    """The method of a scene that is not prepared; that of many facets is chosen when they are cut and illuminated."""
+    method, n_pulses = scene.request.method, len(scene.seen.antennas)
+    if work.by_levels or method == "factorized":
+        return "factorized"
+    if scene.subdivision is None or scene.subdivision.plan.is_float64 or method == "direct":
+        return "spread"
+    direct = n_pulses * len(scene.request.polarizations) * cost_model.FACET_PAIR
+    pays = direct > cost_model.CELL_FACET and work.pieces * direct > cost_model.ECHO_SEARCH_PAYS
+    return "spread or factorized" if pays else "spread"
 
 
 def _timed(task: EchoTask, planned: PlannedEchoes, prepared: SceneEchoes, work: EchoWork) -> Estimate:

@@ -20,6 +20,7 @@ from ._single_channel import SingleChannel, SingleEchoes
 from .channels.array_channels import ArrayChannels
 from .channels.array_channels import Method as ArrayMethod
 from .echo_request import EchoRequest
+from .points.point_plan import PointCosts, expected_method
 from .scene_echoes import SceneEchoes
 from .scene_plan import ScenePlan, planned_scene, samples_shadows
 from .scene_preparation import prepare_scene
@@ -97,6 +98,7 @@ class EchoWork(NamedTuple):
 
     tiling, cutting  of preparing points and facets;  adding  of their echoes
     pieces           about the number of facets after cutting;  contributions  pairs of scatterer, pulse and channel
+    by_levels        whether points are expected to be added by levels
     """
 
     tiling: float
@@ -104,6 +106,7 @@ class EchoWork(NamedTuple):
     adding: float
     pieces: float
     contributions: float
+    by_levels: bool
 
     @property
     def preparing(self) -> float:
@@ -135,11 +138,23 @@ class EchoWork(NamedTuple):
             lit = cost_model.LIT_PIECE * clipped
         n_polarizations, n_samples = len(request.polarizations), planned.channels.shape[-1]
         pulse = cost_model.ECHO_PULSE + cost_model.ECHO_SAMPLE * n_samples + cost_model.SPREAD_PIECE * (smooth + rough)
-        adding = runs * (n_polarizations * pulse + cost_model.SPREAD_POINT * n_points) + lit
+        cost, by_levels = points_cost(scene) if n_points else (0.0, False)
+        adding = runs * (n_polarizations * pulse + cost_model.SPREAD_POINT * cost * n_points) + lit
         contributions = float(runs * (n_points + smooth + rough))
-        return cls(
-            1e-6 * cost_model.TILED_POINT * n_points, 1e-6 * cutting, 1e-6 * adding, smooth + rough, contributions
-        )
+        tiling, cutting, adding = 1e-6 * cost_model.TILED_POINT * n_points, 1e-6 * cutting, 1e-6 * adding
+        return cls(tiling, cutting, adding, smooth + rough, contributions, by_levels)
+
+
+def points_cost(scene: ScenePlan) -> tuple[float, bool]:
+    """About the cost of a pair of point and pulse, in contributions, and whether points are added by levels."""
+    request, seen, n_nodes = scene.request, scene.seen, scene.n_nodes
+    tolerance = scene.error_budget - scene.weight_error.of(n_nodes, scene.error_budget)
+    weights, positions = seen.weights.at(seen.antennas), seen.scene.positions
+    case = weights, scene.bands[0], tolerance, n_nodes
+    if request.method == "direct":
+        return PointCosts.of(len(positions), *case).direct, False
+    cost, by_levels = expected_method(positions, *case, request.device)
+    return cost, by_levels or request.method == "factorized"
 
 
 def pieces_of(scene: ScenePlan) -> tuple[float, float]:

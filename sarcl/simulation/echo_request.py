@@ -33,7 +33,7 @@ class EchoLimits:
     few_looks: float = 2e6
     most_looks: float = 5e7
     prepared_share: float = 0.06
-    prepared_seconds: float = 0.035
+    prepared_seconds: float = 0.025
 
 
 @dataclass(frozen=True, eq=False)

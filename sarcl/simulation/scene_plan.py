@@ -63,6 +63,11 @@ class ScenePlan:
     subdivision: Subdivision | None
     bands: tuple[Band, ...]
 
+    @property
+    def n_nodes(self) -> int:
+        """Number of frequencies at which the weights of points are computed."""
+        return self.weight_error.nodes(NODES * self.error_budget)
+
     def describe(self) -> dict[str, Any]:
         """Words and numbers for a forecast: those of a report that are known before the scene is prepared."""
         facets = {} if self.subdivision is None else self.subdivision.plan.describe()

@@ -14,6 +14,7 @@ from ..base.errors import ToleranceUnreachable
 from ..base.morton import morton_order
 from ..numerics import cost_model
 from ..numerics.error_bounds import FLOAT32
+from ..numerics.interpolator_choice import choose_interpolator
 from ..numerics.plan import LEAST_TOLERANCE, Plan, ProfileSums, carrier_steps, cheapest, least
 from ..numerics.pulse_geometry import PulseGeometry
 from ..numerics.tiles import Tiles, tile_points
@@ -74,6 +75,11 @@ class Band:
         """
         steps = carrier_steps(self.carrier, self.n_samples, self.bandwidth)
         return least(self.n_samples, _chunk(n_scatterers, tolerance), steps)
+
+    def spreading_cost(self, tolerance: float, n_scatterers: int) -> float:
+        """About the cost of a pair of scatterer and row, in contributions."""
+        steps = carrier_steps(self.carrier, self.n_samples, self.bandwidth)
+        return choose_interpolator(tolerance, self.n_samples, n_scatterers, steps, cost_model.SPREADING)[2]
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,9 +215,11 @@ class TiledScatterers:
         distance, highest = antennas.distance(self.tiling.bounds), float(antennas.frequency.max()) + band.bandwidth / 2
         chunk = _chunk(n, tolerance)
         sums = ProfileSums(distance, highest, band.bandwidth, band.n_samples, n, chunk, band.carrier)
+        costs = cost_model.SPREADING if self.device.info.vector_width > 1 else cost_model.ON_CPU
 
         def with_gain(gain: float) -> Plan:
-            return cheapest(tolerance, tiles, sums, near=near, least_tolerance=least_tolerance, image_gain=gain)
+            limits = {"least_tolerance": least_tolerance, "image_gain": gain}
+            return cheapest(tolerance, tiles, sums, near=near, gathering=costs, **limits)
 
         plan = with_gain(1.0)
         if not self._n_coherent:

@@ -80,6 +80,8 @@ def test_wavefronts_of_long_profiles_cost_more_than_taps():
     # with float32 ranges in a tile of a satellite's image: six taps, or four in profiles eight times as long
     gpu, cpu = cost_model.ON_GPU, cost_model.ON_CPU
     assert cpu.of_taps(4, 32.0) == cpu.of_taps(4, 2.0) == cost_model.TAPS[4]
+    spreading, n = cost_model.SPREADING, cost_model.CACHED_SAMPLES
+    assert spreading.of_taps(2, 2.0, n) == spreading.of_taps(2, 2.0) < spreading.of_taps(2, 2.0, 2 * n)
     assert gpu.of_taps(4, 2.0) == gpu.taps[1] < gpu.of_taps(6, 4.0) < gpu.of_taps(4, 32.0)
 
 

@@ -68,17 +68,6 @@ def test_good_lengths_have_small_factors_and_are_the_least():
 
 @pytest.mark.parametrize("dtype", [np.complex64, np.complex128])
 @pytest.mark.parametrize("inverse", [False, True])
-def test_few_rows_and_many_are_transformed_alike(dtype, inverse):
-    """numpy.fft and scipy.fft."""
-    data = noise(40, 99).astype(dtype)
-    few = fft.rows(None, data, inverse=inverse)
-    many = fft.rows(None, data, inverse=inverse, engine="scipy")
-    assert few.dtype == many.dtype == dtype
-    assert np.linalg.norm(few - many) <= (4e-7 if dtype == np.complex64 else 1e-15) * np.linalg.norm(many)
-
-
-@pytest.mark.parametrize("dtype", [np.complex64, np.complex128])
-@pytest.mark.parametrize("inverse", [False, True])
 def test_many_rows_have_the_bits_of_scipy_fft(dtype, inverse):
     import scipy.fft
 

@@ -75,6 +75,25 @@ def test_errors_of_a_scene_that_is_not_prepared_are_bounds(call):
     assert same(told.run(), raw)
 
 
+@pytest.mark.parametrize(
+    "n, n_pulses, method", [(100_000, 300, "factorized"), (100_000, 8, "spread"), (500, 300, "spread")]
+)
+def test_the_method_of_points_is_known_before_they_are_prepared(device, n, n_pulses, method):
+    track = sarcl.Trajectory.line(start=(-7e3, -50.0, 7e3), velocity=(0, 100.0, 0), prf=50.0, n_pulses=n_pulses)
+    subjects, options = (points(n), CHIRP, track), {"tolerance": 1e-2, "check": False, "device": device}
+    told = forecast(UNPREPARED, *subjects, **options)
+    assert told.plan["method"] == (method if device.is_cpu else "spread")
+    assert told.run().report.plan["method"] == told.plan["method"]
+    assert forecast(UNPREPARED, *subjects, **options, method="direct").method == "pulse by pulse"
+
+
+def test_the_method_of_many_facets_is_chosen_when_they_are_cut():
+    track = sarcl.Trajectory.circle(radius=800.0, height=600.0, arc=0.02, n_pulses=600)
+    ground = sarcl.shapes.plate((60.0, 60.0), material=sarcl.Material(diagram="cos"))
+    told = forecast(UNPREPARED, ground, CHIRP, track, tolerance=1e-2, shadows=False)
+    assert told.method == "pulse by pulse or factorized"
+
+
 def test_the_shares_of_shadows_that_are_sampled_bound_their_errors():
     ground = sarcl.shapes.plate((12.0, 12.0), material=sarcl.Material(diagram="cos"))
     subjects, options = (box().moved((0, 0, 0.6)) + ground + points(), CHIRP, TRACK), {"tolerance": 5e-2}

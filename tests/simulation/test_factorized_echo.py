@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
+
 import numpy as np
 import pytest
 from helpers.cases import thinned
@@ -167,6 +170,15 @@ def test_points_in_the_window_are_judged_safely():
     sees = ((delta >= -12) & (delta <= 9)).all(axis=0)
     assert not (inside & ~sees).any()
     assert inside.sum() > 0.6 * sees.sum()  # cells at the edge are left to the direct method
+    assert not antennas.holds(cells.bounds)
+
+
+@pytest.mark.parametrize("less, holds", [((0, 0), True), ((1e-9, 0), False), ((0, 1e-9), False)])
+def test_a_window_holds_a_box_up_to_its_nearest_and_farthest_points(less, holds):
+    track, bounds = np.array([[-3.0, 5.0, 4.0]]), np.array([[0.0, 0.0, 0.0], [2.0, 2.0, 1.0]])
+    near, far = np.sqrt([3**2 + 3**2 + 3**2, 5**2 + 5**2 + 4**2])
+    antennas = PulseGeometry(track, track, near=np.full(1, near + less[0]), far=np.full(1, far - less[1]))
+    assert antennas.holds(bounds) is holds
 
 
 def test_cells_hold_their_points():
@@ -185,6 +197,16 @@ def test_cells_hold_their_points():
         assert (np.ptp(cells.positions[cell == 0], axis=0) <= edge / 2**depth * (1 + 1e-5)).all()
     parents, children = large.parents_of(small), large.children_in(small)
     assert (parents == np.repeat(np.arange(len(large)), np.diff(children))).all()
+
+
+@pytest.mark.parametrize("n", [3000, 200_000])
+@pytest.mark.parametrize("flat", [True, False])
+def test_numbers_of_cells_are_estimated_from_a_sample(n, flat):
+    cells = ScattererCells(cloud(n, flat).positions)
+    numbers = [len(cells.first(depth)) - 1 for depth in range(len(cells.numbers))]
+    assert cells.numbers == pytest.approx(numbers, rel=1e-9 if n == 3000 else 0.15)
+    evenly = ScattererCells(lattice(500).positions)
+    assert evenly.numbers[6] == pytest.approx(len(evenly.first(6)) - 1, rel=0.1)
 
 
 @pytest.mark.costly
@@ -296,6 +318,24 @@ def test_plans_that_cost_more_than_the_direct_method_are_given_up():
     # the cheapest candidate is refused by its own cost, and by what its ratios of decimation become
     for most in (0.0, 0.5 * plan.cost, 0.999 * plan.cost):
         assert plan_levels(*task, amplitudes, most=most) == COSTS_MORE
+
+    def positions_that_nobody_needs():
+        raise AssertionError
+
+    unsorted = ScattererCells(positions_that_nobody_needs, task[0].sample)
+    assert plan_levels(unsorted, *task[1:], amplitudes, most=0.0) == COSTS_MORE
+
+
+def test_points_are_freed_with_their_cells_and_plans():
+    def planned():
+        cells, positions = ScattererCells(cloud().positions), line(300)
+        antennas = PulseGeometry(positions, positions, frequency=9.6e9, frequency_step=1e6)
+        assert plan_levels(cells, antennas, Band(300, 300e6, 9.6e9), 1e-2, Amplitudes(lambda leaf: 0.0)).cost > 0
+        return weakref.ref(cells)
+
+    reference = planned()
+    gc.collect()
+    assert reference() is None
 
 
 @pytest.mark.parametrize("carrier", [9.6e9, 9.6123456789e9])

@@ -12,7 +12,7 @@ from ...numerics import cost_model
 from ...numerics.plan import Plan
 from ...scattering.facets import POLARIZATIONS, FacetSet, diagram_macros, vertical_axes
 from ...scattering.kept_amplitudes import AmplitudeSamples, passes_overhead
-from ..factorized.cells import ScattererCells, scatterers_in_window
+from ..factorized.cells import PlaceSample, ScattererCells, drawn_numbers, scatterers_in_window
 from ..factorized.levels import COSTS_MORE, FEWEST_PULSES, Amplitudes, FactorizedPlan, plan_levels
 from ..factorized.scatterers import Channel, Scatterers
 from ..factorized.spreader import FactorizedSpreader
@@ -91,10 +91,10 @@ class _Case:
     def by_levels(self) -> _Levels | str:
         """The facets that are added by levels, or the reason why none are."""
         view, antennas, device = self.view, self.view.antennas, self.tiled.device
-        least = 1 if self.forced else cost_model.SEARCH_PAYS
+        fewest = 1 if self.forced else cost_model.ECHO_SEARCH_PAYS / (self._direct_cost * len(antennas))
         if len(antennas) < FEWEST_PULSES:
             return f"the track has {len(antennas)} pulses, and {FEWEST_PULSES} are the fewest that are decimated"
-        if len(self.facets) * len(antennas) < least:
+        if len(self.facets) < fewest:
             return "planning would take longer than it saves"
         if not self.forced and not self.tiled.stays:
             return "all pieces together take more than the memory for them"
@@ -102,18 +102,19 @@ class _Case:
             return "the GPU adds these pulses before the host has made cells"
         if not self.forced and BYTES * len(self.facets) > self.budget:
             return "cells of so many facets take more memory than max_bytes allows"
-        most = math.inf if self.forced else cost_model.MERGING_PAYS * self._direct_cost
+        most = math.inf if self.forced else cost_model.LEVELS_PAY * self._direct_cost
         if cost_model.CELL_FACET > most * len(antennas):
             return COSTS_MORE
         if passes_overhead(self.facets, view.weights, view.vertical):
             return "antennas pass over the facets, where horizontal and vertical turn fast"
         steady = np.flatnonzero(~self.facets.is_changing)
-        if len(steady) * len(antennas) < least:
+        if len(steady) < fewest:
             return "shadows move over too many of the facets"
-        cells = ScattererCells(self.tiled.numbers[0][steady])
+        sample = PlaceSample(len(steady), self.facets.places(steady[drawn_numbers(len(steady))]), self.facets.bounds)
+        cells = ScattererCells(lambda: self.tiled.numbers[0][steady], sample)
         seen = scatterers_in_window(cells, antennas)
         if not seen.all():
-            if seen.sum() * len(antennas) < least:
+            if seen.sum() < fewest:
                 return "too few facets lie inside the range window at every pulse"
             steady = steady[np.sort(cells.order[seen])]
             cells = ScattererCells(self.tiled.numbers[0][steady])
@@ -129,7 +130,9 @@ class _Case:
 
     def _amplitudes(self, numbers: np.ndarray) -> Amplitudes:
         """What the plan must know of facets of these numbers."""
-        view, some = self.view, self.facets.chosen(numbers)
+        view, some = self.view, self.facets
+        if len(numbers) < len(some):
+            some = some.chosen(numbers)
         highest = float(view.frequencies[-1])
         samples = AmplitudeSamples.of_facets(some, view.weights, self._polarizations, view.vertical, highest)
         gain = cost_model.GAIN * view.weights.is_needed
@@ -157,7 +160,7 @@ class _Case:
     @property
     def _direct_cost(self) -> float:
         """About the cost of a pair that is added directly, in contributions."""
-        return cost_model.FACET_PAIR * self._n_channels
+        return cost_model.FACET_PAIR * self._n_channels * self.view.band.spreading_cost(self._room, len(self.facets))
 
     def scatterers(self, cells: ScattererCells, numbers: np.ndarray) -> Scatterers:
         """Facets of these numbers, in the order of the cells, as the kernel reads them."""

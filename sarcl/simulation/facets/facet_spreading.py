@@ -202,7 +202,7 @@ class FacetSpreader:
         self.reach, self.up = device.upload(weights.limits), device.upload(vertical_axes(vertical))
         self.table = device.upload(plan.interpolator.table)
         self.flush = max(1, int(terms(tolerance) / tiles.per_tile))
-        self.spectra_of = SpreadSamples(device, self.n_samples, plan.interpolator, plan.length, len(self.antennas))
+        self.spectra_of = SpreadSamples(device, self.n_samples, plan.interpolator, plan.length)
 
     def _blocks(self, budget: float) -> tuple[int, int]:
         """Pulses per block, and tiles whose amplitudes are held at once, that keep to the budget, bytes."""

@@ -2,7 +2,7 @@
 
 For other folders:
 
-    cells       scatterers in cubic cells, level by level, and those that the range windows of all pulses hold
+    cells       scatterers in cubic cells, numbers of cells from a sample, and scatterers that all range windows hold
     levels      levels of cells, decimation and interpolation for a tolerance
     scatterers  what the kernel of the smallest cells reads of scatterers, and the sums that they make
     spreader    adds scatterers to samples by a plan of levels

@@ -15,10 +15,12 @@ from ...opencl.launch_numbers import launch_numbers
 from ..spreading import most_pulses
 from ._leaves import Leaves
 from .cells import CellLevel
-from .levels import FactorizedPlan
+from .levels import FactorizedPlan, Level
 from .scatterers import Scatterers
 
 EXPAND = "expand_subapertures.cl"
+# bytes that a pulse reads of the cells of a launch on a CPU: the next pulse reads nearly the same from a core's cache
+CACHED = 2**19
 SPAN, GROUP_SPAN, GROUP = 512, 256, 64  # samples that a work-group of a CPU adds up, and of a GPU; its work-items there
 
 
@@ -59,22 +61,29 @@ class Target:
 
 @dataclass(frozen=True, eq=False)
 class _Join:
-    """Which cells lie in which larger ones, of which there are n_larger: on the host and on the device."""
+    """Which cells lie in which larger ones, of which there are n_larger: on the host and on the device.
+
+    launches  first and last + 1 of the cells in each larger one that are joined together, launch by launch
+    """
 
     n_larger: int
     parents: np.ndarray
     children: np.ndarray
     parents_on_device: Buffer
-    children_on_device: Buffer
+    launches: list[Buffer]
 
     @classmethod
-    def of(cls, device: Device, larger: CellLevel | None, cells: CellLevel) -> _Join:
+    def of(cls, device: Device, larger: CellLevel | None, level: Level) -> _Join:
         """larger  None: all cells lie in one"""
-        if larger is None:
-            parents, children = np.zeros(len(cells), np.int32), np.array([0, len(cells)], np.int32)
-        else:
+        cells = level.cells
+        if larger is not None:
             parents, children = larger.parents_of(cells), larger.children_in(cells)
-        return cls(len(children) - 1, parents, children, device.upload(parents), device.upload(children))
+            return cls(len(larger), parents, children, device.upload(parents), [device.upload(children)])
+        parents, n = np.zeros(len(cells), np.int32), len(cells)
+        step = max(CACHED // (8 * level.stride * level.decimation.filter.shape[1]), 1) if device.is_cpu else n
+        edges = np.array([*range(0, n, step), n], np.int32)
+        launches = [device.upload(edges[i : i + 2].copy()) for i in range(len(edges) - 1)]
+        return cls(1, parents, edges[[0, -1]], device.upload(parents), launches)
 
 
 class Ascent:
@@ -106,9 +115,9 @@ class Ascent:
         self.filters = [device.upload(level.decimation.filter) for level in levels]
         self.neighbours = [device.upload(level.decimation.neighbours) for level in levels]
         cells = [level.cells for level in levels]
-        self.joins = [_Join.of(device, *pair) for pair in zip([None, *cells], cells, strict=False)]
+        self.joins = [_Join.of(device, *pair) for pair in zip([None, *cells], levels, strict=False)]
         self.between = device.upload(plan.between.table)
-        self.spectra_of = SpreadSamples(device, n_samples, plan.leaf.interpolator, length, len(antennas))
+        self.spectra_of = SpreadSamples(device, n_samples, plan.leaf.interpolator, length)
         self.stride = length + 2 * range_profiles.padding(plan.leaf.interpolator)
         per_pulse, room = 24 * self.stride + self.spectra_of.row_bytes, budget / 4
         n_roots, n_pulses = len(levels[0].cells), len(antennas)
@@ -187,7 +196,9 @@ class Ascent:
         numbers |= {"reach": planned.reach, "new_stride": target.stride, "new_origin": target.origin}
         numbers |= {"n_planes": target.n_planes, "plane": target.plane, "first_pulse": target.first_pulse}
         launch = launch_numbers(EXPAND, "expand", **numbers)
-        tables = join.children_on_device, records, self.neighbours[level], self.filters[level]
+        tables = records, self.neighbours[level], self.filters[level]
         size = (-(-target.stride // span) * items, pulses.n_used, stop - larger)
-        device.run(expand, size, (items, 1, 1), launch, profiles, *tables, target.profiles, steps=last - first)
+        for children in join.launches:
+            steps = (last - first) / len(join.launches)
+            device.run(expand, size, (items, 1, 1), launch, profiles, children, *tables, target.profiles, steps=steps)
         device.finish()  # on a CPU profiles are memory of the host: they must exist until the kernel has read them

@@ -21,12 +21,11 @@ from ...numerics.subapertures import Decimation, decimated, filter_error, rates,
 from ...opencl import fft
 from ...scattering.kept_amplitudes import AmplitudeSamples
 from ..spreading import Band
-from .cells import CellLevel, ScattererCells
+from .cells import DEEPEST, CellLevel, ScattererCells
 
 FEWEST_PULSES = 8  # fewer are not decimated
 SPACINGS = (1.5, 2.0, 2.5, 3.0, 4.0)  # profile samples per 1/bandwidth
 TAPS = (4, 6, 8)  # taps of the interpolators along range and along the track
-DEEPEST = 12  # depth of the smallest cells: beyond it cells of a million points hold one each
 STEPS = (1, 2, 3, 4)  # depths between two levels
 TRIES = 4  # candidates whose errors are computed in full
 MOVING_SHARE = 0.7  # share of the tolerance for moving profiles between levels; the rest is for the smallest cells
@@ -34,7 +33,7 @@ SPREADING_SHARE = 0.6  # share of that rest for the kernel that spreads points
 AMPLITUDE_SHARE = 0.2  # share of the tolerance for amplitudes that change along the track; all else has the rest
 SHARE_SLACK = 1.3  # ratio of a filter's error to its share, at most: other errors are often below theirs
 SMALLER_RATIO = 0.75  # factor on a decimation ratio whose error is too large
-POINTS = 64  # points along the Morton curve at which the change of direction is estimated
+POINTS = 64  # points at which the change of direction is estimated
 CENTERS = 4  # cells of a level where directions change fastest, in which a filter's error is computed
 COSTS_MORE = "the direct method costs less"
 DIRECTIONS = np.array([v for v in np.ndindex(3, 3, 3) if v != (1, 1, 1)], float) - 1
@@ -137,11 +136,19 @@ def plan_levels(
     candidates = sorted(case.candidates(), key=lambda candidate: candidate.cost)
     reason = "neighbouring pulses see even the smallest cells of points from directions that differ too much"
     for candidate in candidates[:TRIES]:
-        plan = case.build(candidate)
+        plan = COSTS_MORE if candidate.cost > most else case.build(candidate)
         if not isinstance(plan, str):
             return plan
         reason = plan
     return reason
+
+
+def expected_cost(
+    cells: ScattererCells, antennas: PulseGeometry, band: Band, tolerance: float, amplitudes: Amplitudes
+) -> float:
+    """About the cost of the cheapest plan, per pair of scatterer and pulse; infinite where no cells are decimated."""
+    case = _Case(cells, antennas, band, tolerance, amplitudes, math.inf)
+    return min((candidate.cost for candidate in case.candidates()), default=math.inf)
 
 
 class _Case:
@@ -162,22 +169,23 @@ class _Case:
         group = groups(len(antennas), antennas.frequency, antennas.frequency_step)
         self.antennas = replace(antennas, runs=tuple(smooth_runs(antennas.tx, antennas.rx, group)))
         self.highest = float(antennas.frequency.max()) + band.bandwidth / 2
-        points = cells.positions[spread_over(len(cells), POINTS)] + cells.center
+        points = cells.sample.places[spread_over(len(cells.sample.places), POINTS)]
         fastest = float(rates(self.antennas, points, None, most=256).max())
         self.turning = fastest * 2 * self.highest / SPEED_OF_LIGHT  # cycles per pulse and metre
 
     def candidates(self) -> Iterator[Candidate]:
         """All candidates, with their estimated costs."""
+        shares = [MOVING_SHARE * self.tolerance / (2 * n) for n in (1, 2, 3)]
+        kernels = [self._interpolators(share) for share in shares]
         for depths in chains(len(self.cells)):
-            share = MOVING_SHARE * self.tolerance / (2 * len(depths))
+            share = shares[len(depths) - 1]
             filters = [(taps, fine, self._ratios(depths, fine)) for taps, fine in _filters(share)]
-            for spread, between, length in self._interpolators(share):
+            for spread, between, length in kernels[len(depths) - 1]:
                 for filter_taps, fine, ratios in filters:
                     if ratios is not None:
                         cost = self._cost(depths, spread, between, filter_taps, ratios)
                         yield Candidate(depths, spread, between, length, filter_taps, fine, share, ratios, cost)
 
-    @functools.cache  # noqa: B019  a few tables, which live as long as the plan is made
     def _interpolators(self, share: float) -> list[tuple[Interpolator, Interpolator, int]]:
         """Kernels that spread points, and that move profiles, within their shares, and the length of the profiles: for
         each number of taps the widest spacing of samples."""
@@ -205,7 +213,7 @@ class _Case:
         """Decimation ratios of the levels; None where one of them cannot decimate."""
         spaced, n_pulses, ratios = 1, len(self.antennas), []
         for depth in depths:
-            radius = self.cells.typical_radius(depth)
+            radius = self.cells.typical_radii[depth]
             resolved = 1 / max(2 * fine * self.turning * radius * spaced, 1e-30)  # of one point, any number
             ratio = int(min(resolved, max(1, n_pulses // (2 * spaced))))
             if ratio < 2:
@@ -226,16 +234,14 @@ class _Case:
         sigma = 2 * self.band.bandwidth / SPEED_OF_LIGHT * spread.oversample
         n_pulses, total = float(len(self.antennas)), 0.0
         for depth, ratio in zip(depths, ratios, strict=True):
-            samples = 2 * self.cells.typical_radius(depth) * sigma + spread.taps + 2 * between.taps
-            n_cells = len(self.cells.first(depth)) - 1
+            samples = 2 * self.cells.typical_radii[depth] * sigma + spread.taps + 2 * between.taps
+            n_cells = self.cells.numbers[depth]
             total += n_cells * n_pulses * cost_model.expanding(samples, between.taps, filter_taps)
             n_pulses = n_pulses / ratio + filter_taps
-        total += n_pulses * (
-            len(self.cells) * (cost_model.LEAF_POINT * cost_model.TAPS[spread.taps] + self.amplitudes.leaf)
-            + n_cells
-            * (cost_model.LEAF_ROW + cost_model.LEAF_LANES * self.amplitudes.leaf + cost_model.LEAF_SAMPLE * samples)
-        )
-        total = self.amplitudes.channels * total + self.amplitudes.cell * len(self.cells)
+        lanes = len(self.cells) + cost_model.LEAF_LANES * n_cells
+        lane = cost_model.LEAF_POINT * cost_model.SPREADING.of_taps(spread.taps, 1.0) + self.amplitudes.leaf
+        total += n_pulses * (lanes * lane + n_cells * cost_model.LEAF_SAMPLE * samples)
+        total = self.amplitudes.channels * total + self.amplitudes.cell * len(self.cells) + cost_model.LEVELS
         return total / (len(self.cells) * len(self.antennas))
 
     def build(self, candidate: Candidate) -> FactorizedPlan | str:
@@ -248,8 +254,6 @@ class _Case:
         ratios: list[int] = []
         samples, left = self.amplitudes.samples, self.changing
         weights, changes = samples and samples.weights, 0.0
-        if candidate.cost > self.most:
-            return COSTS_MORE
         for cells, ratio in zip(levels, candidate.ratios, strict=True):
             most = (left - changes) / (len(levels) - len(decimations))
             while True:

@@ -99,8 +99,8 @@ class _PointKernel:
         self.patterns, self.second = weights.upload(device)
         self.reach = device.upload(weights.limits)
         self.flush = max(1, int(terms(spreader.tolerance) / tiles.per_tile))
-        n_samples, n_pulses = len(spreader.view.frequencies), len(spreader.view.antennas)
-        self.spectra_of = SpreadSamples(device, n_samples, plan.interpolator, plan.length, n_pulses)
+        n_samples = len(spreader.view.frequencies)
+        self.spectra_of = SpreadSamples(device, n_samples, plan.interpolator, plan.length)
         per_pulse = self.tile_constants.nbytes * tiles.n_tiles + self.spectra_of.row_bytes * n_nodes
         per_pulse += self.rows.pulse_bytes
         most, lanes = min(most_pulses(device), int(spreader.budget / 2 / per_pulse)), device.info.vector_width

@@ -12,8 +12,7 @@ import numpy as np
 from ...base.errors import NotApplicable
 from ...model.waveform import Waveform
 from ...numerics import cost_model
-from ...numerics.interpolator_choice import choose_interpolator
-from ...numerics.plan import Plan, carrier_steps
+from ...numerics.plan import Plan
 from ...numerics.polynomials import lagrange
 from ...numerics.pulse_geometry import PulseGeometry
 from ...opencl.device import Device
@@ -21,7 +20,7 @@ from ...scattering.antenna_weights import AntennaWeights
 from ...scattering.kept_amplitudes import AmplitudeSamples
 from ...scattering.scatterers import Points
 from ..factorized.cells import ScattererCells, scatterers_in_window
-from ..factorized.levels import FEWEST_PULSES, Amplitudes, FactorizedPlan, plan_levels
+from ..factorized.levels import FEWEST_PULSES, Amplitudes, FactorizedPlan, expected_cost, plan_levels
 from ..factorized.scatterers import Channel, Scatterers
 from ..factorized.spreader import FactorizedSpreader
 from ..kernel_images import PatchSamples, sample_patches
@@ -85,6 +84,39 @@ class PointPlan:
         return FactorizedSpreader(device, plan, scatterers, view.antennas, len(view.frequencies), budget)
 
 
+@dataclass(frozen=True, eq=False)
+class PointCosts:
+    """Costs of adding n points of a channel, in contributions per pair of point and pulse.
+
+    gain  of antennas and distances, at each pulse or kept position;  direct  at each pulse
+    fewest  points for which levels are looked for
+    """
+
+    gain: float
+    direct: float
+    fewest: float
+
+    @classmethod
+    def of(cls, n: int, weights: AntennaWeights, band: Band, tolerance: float, n_nodes: int) -> PointCosts:
+        """n_nodes  frequencies at which gains are computed"""
+        gain = cost_model.GAIN if weights.is_needed else 0.0
+        direct = n_nodes * (band.spreading_cost(tolerance, n) + gain)
+        return cls(gain, direct, cost_model.ECHO_SEARCH_PAYS / (direct * len(weights.geometry)))
+
+
+def expected_method(
+    positions: np.ndarray, weights: AntennaWeights, band: Band, tolerance: float, n_nodes: int, device: Device
+) -> tuple[float, bool]:
+    """About the cost per pair of point and pulse of the method that "auto" takes, and whether it is by levels."""
+    antennas, costs = weights.geometry, PointCosts.of(len(positions), weights, band, tolerance, n_nodes)
+    beside_cells = not device.is_cpu and len(antennas) < cost_model.PULSES_BESIDE_CELLS
+    if len(antennas) < FEWEST_PULSES or len(positions) < costs.fewest or beside_cells:
+        return costs.direct, False
+    kind = Amplitudes(lambda leaf: 0.0, None, n_nodes, costs.gain)
+    by_levels = expected_cost(ScattererCells(positions), antennas, band, tolerance, kind)
+    return min(by_levels, costs.direct), by_levels <= cost_model.LEVELS_PAY * costs.direct
+
+
 @dataclass(eq=False)
 class PreparedPoints:
     """Points, and what the plans of all channels share.
@@ -129,36 +161,35 @@ class PreparedPoints:
     def _by_levels(self, weights: AntennaWeights, band: Band, tolerance: float, n_nodes: int) -> PointPlan | str:
         """The factorised plan, or the reason why the direct one is taken."""
         antennas, forced = weights.geometry, self.method == "factorized"
-        pairs = len(self) * len(antennas)
+        costs = PointCosts.of(len(self), weights, band, tolerance, n_nodes)
+        fewest = 1 if forced else costs.fewest
         if len(antennas) < FEWEST_PULSES:
             return f"the track has {len(antennas)} pulses, and {FEWEST_PULSES} are the fewest that are decimated"
-        if not forced and pairs < cost_model.SEARCH_PAYS:
+        if len(self) < fewest:
             return "planning would take longer than it saves"
         if not forced and not self.device.is_cpu and len(antennas) < cost_model.PULSES_BESIDE_CELLS:
             return "the GPU adds these pulses before the host has made cells"
-        seen = scatterers_in_window(self._cells, antennas)
-        numbers, cells = self._cells.order, self._cells
+        seen, numbers, cells = scatterers_in_window(self._cells, antennas), None, self._cells
         if not seen.all():
-            numbers = numbers[seen]
-            if len(numbers) * len(antennas) < (1 if forced else cost_model.SEARCH_PAYS):
+            numbers = self._cells.order[seen]
+            if len(numbers) < fewest:
                 return "too few points lie inside the range window at every pulse"
             cells = ScattererCells(self.points.positions[numbers])
-            numbers = numbers[cells.order]
-        samples, leaf = None, 0.0
+        samples = None
         if weights.is_needed:
-            highest, leaf = band.carrier + band.bandwidth / 2, cost_model.GAIN
-            places, amplitudes = self.points.positions[numbers], self.points.amplitudes[numbers]
+            highest = band.carrier + band.bandwidth / 2
+            some = slice(None) if numbers is None else numbers
+            places, amplitudes = self.points.positions[some], self.points.amplitudes[some]
             samples = AmplitudeSamples.of_points(places, amplitudes, weights, highest)
-        kind = Amplitudes(lambda leaf: self._image_error(leaf, band), samples, n_nodes, leaf)
-        direct = n_nodes * (_direct_cost(band, tolerance, len(self)) + leaf)
-        most = math.inf if forced else cost_model.MERGING_PAYS * direct
+        kind = Amplitudes(lambda leaf: self._image_error(leaf, band), samples, n_nodes, costs.gain)
+        most = math.inf if forced else cost_model.LEVELS_PAY * costs.direct
         plan = plan_levels(cells, antennas, band, tolerance, kind, most=most)
         if isinstance(plan, str):
             return plan
-        if seen.all():
-            return PointPlan(None, (cells, numbers, plan))
+        if numbers is None:
+            return PointPlan(None, (cells, cells.order, plan))
         rest = self._tiled(self._cells.order[~seen])
-        return PointPlan((rest, rest.plan(antennas, band, tolerance)), (cells, numbers, plan))
+        return PointPlan((rest, rest.plan(antennas, band, tolerance)), (cells, numbers[cells.order], plan))
 
     @functools.cached_property
     def _cells(self) -> ScattererCells:
@@ -185,9 +216,3 @@ class PreparedPoints:
         """Error of a plan's kernel, larger where points lie so evenly that its images add up."""
         kernel = plan.interpolator
         return max(kernel.error, self._patches.error(kernel, plan.length, band.n_samples, band.bandwidth))
-
-
-def _direct_cost(band: Band, tolerance: float, n_points: int) -> float:
-    """About the cost of a pair that is added directly, in contributions."""
-    steps = carrier_steps(band.carrier, band.n_samples, band.bandwidth)
-    return choose_interpolator(tolerance, band.n_samples, n_points, steps)[2]
