@@ -273,9 +273,9 @@ class RoughFacets(FacetSet):
     def places(self, numbers: np.ndarray) -> np.ndarray:
         """As of FacetSet: random points on the facets that were cut into these pieces."""
         pieces = self.pieces
-        some = numbers if pieces.some is None else pieces.some[numbers]
-        facets = pieces.facets[np.searchsorted(np.cumsum(pieces.counts, dtype=np.int64), some, side="right")]
-        weights = np.random.default_rng(0).dirichlet((1.0, 1.0, 1.0), len(some))
+        subset = numbers if pieces.subset is None else pieces.subset[numbers]
+        facets = pieces.facets[np.searchsorted(np.cumsum(pieces.counts, dtype=np.int64), subset, side="right")]
+        weights = np.random.default_rng(0).dirichlet((1.0, 1.0, 1.0), len(subset))
         return np.asarray(np.einsum("nc,ncx->nx", weights, facets))
 
     def drawn(self, most: int, random: np.random.Generator) -> tuple[FacetSet, np.ndarray]:
