@@ -139,7 +139,7 @@ def run_bytes(
 def run_cost(shape: np.ndarray, cell: float, area: float, band: tuple[float, float]) -> RunCost:
     """What one run takes on a grid of `shape` cells (3,) with a target of a surface of `area` m^2."""
     diagonal = float(np.linalg.norm(shape - 2 * (ABSORBER + GAP)))  # cells
-    pulse_steps = 2 * _pulse(band).half_length * SPEED_OF_LIGHT / (COURANT * cell)
+    pulse_steps = 2 * incident_pulse(band).half_length * SPEED_OF_LIGHT / (COURANT * cell)
     entries = ENTRIES * area / cell**2
     _, grid = run_bytes(shape, 0.4 * entries, 0.6 * entries, 0)
     return RunCost(grid, entries, int(pulse_steps + (1 + RINGING) * diagonal / COURANT))
@@ -186,8 +186,8 @@ def run(
     """
     place, sent = anchor
     sources = currents(
-        device, lattice, target, PlaneWave(centre_of(lattice) - place, sent, _pulse(band)), k, absorber=ABSORBER,
-        gap=GAP, tolerance=tolerance, most_steps=most_steps, progress=progress,
+        device, lattice, target, PlaneWave(centre_of(lattice) - place, sent, incident_pulse(band)), k,
+        absorber=ABSORBER, gap=GAP, tolerance=tolerance, most_steps=most_steps, progress=progress,
     )  # fmt: skip
     echoes = [formed_echoes(device, sources, tx, rx, received, max_bytes=max_bytes)]
     if twin is not None:
@@ -195,5 +195,6 @@ def run(
     return echoes, RunEnd(sources.n_steps, sources.left)
 
 
-def _pulse(band: tuple[float, float]) -> Pulse:
+def incident_pulse(band: tuple[float, float]) -> Pulse:
+    """The pulse that runs send for a band, Hz: no narrower than WIDEST allows."""
     return Pulse.gaussian(min(band[0], WIDEST * band[1]), band[1])

@@ -21,6 +21,7 @@ import sarcl
 from sarcl import Material, shapes
 from sarcl.blocks import checkpoint
 from sarcl.cli import parser
+from sarcl.fullwave import runs
 from sarcl.opencl.choose_device import open_device
 from sarcl.opencl.device_list import devices
 from sarcl.opencl.failures import DeviceFailed
@@ -77,14 +78,14 @@ def same(one, two):
     return np.array_equal(one.samples[:], two.samples[:])
 
 
-def stop_after(runs):
+def stop_after(n_runs):
     """A progress function that ends the call once so many runs have begun to be reported as done."""
     seen = []
 
     def progress(stage, done, total):
         if stage == "full-wave runs" and done and done not in seen:
             seen.append(done)
-            if len(seen) > runs:
+            if len(seen) > n_runs:
                 raise Stopped
 
     return progress
@@ -239,9 +240,7 @@ def test_two_devices_of_a_kind_make_the_bits_of_one(case, pair, whole):
 
 
 def test_both_devices_compute_runs_and_one_that_is_lost_is_left_out(pair, whole, monkeypatch, caplog):
-    from sarcl.fullwave.echoes import _fullwave_task
-
-    run, users, lost, begun = _fullwave_task.runs.run, set(), set(), threading.Barrier(2, timeout=60)
+    run, users, lost, begun = runs.run, set(), set(), threading.Barrier(2, timeout=60)
 
     def counted(device, *args, **options):
         if device in lost:
@@ -251,7 +250,7 @@ def test_both_devices_compute_runs_and_one_that_is_lost_is_left_out(pair, whole,
             begun.wait()
         return run(device, *args, **options)
 
-    monkeypatch.setattr(_fullwave_task.runs, "run", counted)
+    monkeypatch.setattr(runs, "run", counted)
     assert same(of("all", device=pair), whole("all")) and users == set(pair)
     lost.add(pair[1])
     assert same(of("all", device=pair), whole("all")) and "the other devices go on without it" in caplog.text

@@ -170,7 +170,7 @@ def two_devices(monkeypatch, works):
         return Outcome(fp64=fp64, fast_fp64=fp64)
 
     monkeypatch.setattr(device_list, "trial", trial)
-    monkeypatch.setattr(choose_device, "_open", lambda index: index)
+    monkeypatch.setattr(choose_device, "open_listed", lambda index: index)
     return tried
 
 
