@@ -14,7 +14,7 @@ from scipy.io import savemat
 
 import sarcl
 from sarcl.cli.parser import main
-from sarcl.io import formats, hdf5, output_paths, sarcl_hdf5
+from sarcl.io import formats, output_paths, sarcl_hdf5
 from sarcl.model import store
 from sarcl.model.phase_history import PER_ROW
 
