@@ -14,6 +14,7 @@ from ..opencl.choose_device import open_device
 from ..opencl.device import Device
 from ..opencl.memory_budget import budget
 from ..scattering.facet_plan import MOST_FACETS
+from ..scattering.pulse_nodes import WORTH
 from ..scene.scene import Scene
 from .scene_options import SceneOptions
 
@@ -33,6 +34,7 @@ class EchoLimits:
     float64_terms     facets times pulses times samples that may be added up in float64, in about a second
     kept_pieces       share of the memory for blocks: where pieces of rough facets take more of the device, they are
                       made anew for each block of pulses
+    own_amplitudes    pairs of facet and pulse, below which every pulse has amplitudes of its own
     checked_facets    facets times samples that are recomputed to check echoes: two or three seconds
     """
 
@@ -43,6 +45,7 @@ class EchoLimits:
     facets: float = MOST_FACETS
     float64_terms: float = 4e6
     kept_pieces: float = 0.5
+    own_amplitudes: float = WORTH
     checked_facets: float = 256 * 20_000
 
 

@@ -116,15 +116,14 @@ def test_the_baseline_is_an_image_of_the_case(scene):
     assert 1e-4 < error < 4e-3  # the hat at the edge of a 16 times oversampled band, (pi/32)^2/3, is its worst
 
 
-def test_some_pulses_of_the_baseline_stand_for_all(monkeypatch):
-    monkeypatch.setattr(numpy_baseline, "PAIRS", 2 * 16**2)
-    case = _cases.make("spotlight", 16, pixels=256)
+def test_some_pulses_of_the_baseline_stand_for_all():
+    case = _cases.make("spotlight", 240, pixels=256)
     competitor = numpy_baseline.competitors(case)[0]
-    assert competitor.share == 1 / 8 and "2 pulses, seconds times 8" in competitor.setting
+    assert competitor.share == 139 / 240 and "139 pulses, seconds times 2" in competitor.setting
     ran = competitor.run()
     (row,) = _measure.measure(case, [replace(competitor, run=lambda: ran)], repeats=1, limit=60, paces={})
     assert row["error"] < 4e-3
-    assert set(row["seconds"]["call"]) == {8 * ran.seconds["call"]}
+    assert set(row["seconds"]["call"]) == {ran.seconds["call"] / competitor.share}
 
 
 def constant(values, seconds, **options):
