@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import os
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -53,14 +54,16 @@ for line in sys.stdin:
 
 
 @pytest.fixture
-def stand_in(tmp_path, monkeypatch):
-    """Puts a peer of our own in fastsar's place; call with dies=True for one that falls over."""
+def stand_in(tmp_path):
+    """A program that runs a peer of our own in fastsar's place; call with dies=True for one that falls over."""
 
     def make(dies=False):
         script = tmp_path / "peer.py"
         script.write_text(STAND_IN.replace("DIES", str(dies)))
-        monkeypatch.setattr(_peers, "SCRIPT", script)
-        return script
+        program = tmp_path / "python"
+        program.write_text(f'#!/bin/sh\nexec "{sys.executable}" "{script}"\n')
+        program.chmod(0o755)
+        return str(program)
 
     return make
 
@@ -248,9 +251,8 @@ SMALL = {"scenes": ["straight"], "sizes": [16], "tolerances": [1e-2], "repeats":
 
 @pytest.mark.slow
 def test_sarcl_and_a_peer_in_one_run(stand_in, tmp_path):
-    stand_in()
     lines = []
-    document = bench.run(**SMALL, say=lines.append)
+    document = bench.run(**SMALL, peer_python=stand_in(), say=lines.append)
     assert document["peers"] == [{"name": "fastsar", "version": "1", "python": "3", "backend": "cpu"}]
     rows = document["cases"][0]["rows"]
     ours = [r for r in rows if r["who"] == "sarcl" and "absent" not in r]
@@ -269,8 +271,7 @@ def test_sarcl_and_a_peer_in_one_run(stand_in, tmp_path):
 
 
 def test_a_peer_that_dies_costs_its_own_lines_only(stand_in):
-    stand_in(dies=True)
-    document = bench.run(**{**SMALL, "methods": ["direct"]})
+    document = bench.run(**{**SMALL, "methods": ["direct"]}, peer_python=stand_in(dies=True))
     rows = {(r["who"], r["setting"]): r for r in document["cases"][0]["rows"]}
     for upsample in (4, 8, 16):
         assert "the stand-in fell over" in rows["stand-in 1", f"cubic, {upsample} x"]["absent"]
