@@ -305,13 +305,15 @@ def pretend(monkeypatch, stop_after=None, left=0.0):
     """Runs of the grid replaced by random echoes; the list of those that are done. The one after `stop_after` fails."""
     done = []
 
-    def run(device, lattice, target, band, k, *, anchor, twin, tx, received, **options):
+    def run(device, lattice, target, band, k, *, anchor, antennas, options):
         if len(done) == stop_after:
             raise RuntimeError("the machine is switched off")
-        done.append(anchor)
-        random = np.random.default_rng(int(1e6 * abs(np.concatenate(anchor).sum())))
-        made = (random.normal(size=(len(tx), len(received), len(k), 2)) @ [1, 1j]).astype(np.complex64)
-        return [made, 2 * made][: 1 + (twin is not None)], runs.RunEnd(100, left)
+        done.append((anchor.place, anchor.sent))
+        random = np.random.default_rng(int(1e6 * abs(np.concatenate(done[-1]).sum())))
+        made = (random.normal(size=(len(antennas.tx), len(antennas.received), len(k), 2)) @ [1, 1j]).astype(
+            np.complex64
+        )
+        return [made, 2 * made][: 1 + (anchor.twin is not None)], runs.RunEnd(100, left)
 
     monkeypatch.setattr(runs, "run", run)
     return done
