@@ -42,9 +42,9 @@ def echoes(
     place = -DISTANCE * travel / np.linalg.norm(travel)
     target = runs.target_of(grid, [(triangles, None)], top)
     (made,), _ = runs.run(
-        device, grid, target, (float(band[0]), float(band[1])), k, anchor=(place, sent), twin=None,
-        tolerance=1e-4, tx=np.broadcast_to(place, towards.shape), rx=DISTANCE * towards,
-        received=received[None], most_steps=20_000, max_bytes=4e9,
+        device, grid, target, (float(band[0]), float(band[1])), k, anchor=runs.Anchor(place, sent),
+        antennas=runs.Antennas(np.broadcast_to(place, towards.shape), DISTANCE * towards, received[None]),
+        options=runs.RunOptions(max_bytes=4e9),
     )  # fmt: skip
     return np.asarray(made[:, 0])
 

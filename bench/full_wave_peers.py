@@ -102,8 +102,9 @@ class Ours:
         across, antenna = np.array([0.6, 1.0, 0.0]) / np.hypot(0.6, 1), self.antenna[None]
         started = time.perf_counter(), time.process_time()
         runs.run(
-            self.device, self.grid, self.targets[name], self.band, self.k, anchor=(self.antenna, across), twin=None,
-            tx=antenna, rx=antenna, received=across[None, None], tolerance=1e-4, most_steps=steps, max_bytes=1e9,
+            self.device, self.grid, self.targets[name], self.band, self.k, anchor=runs.Anchor(self.antenna, across),
+            antennas=runs.Antennas(antenna, antenna, across[None, None]),
+            options=runs.RunOptions(most_steps=steps, max_bytes=1e9),
         )  # fmt: skip
         return time.perf_counter() - started[0], time.process_time() - started[1]
 

@@ -189,7 +189,7 @@ def resampled(db: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
     if top == -np.inf:
         return np.full(shape, top)
     with np.errstate(divide="ignore"):
-        return np.asarray(top + 10 * np.log10(_average_power(db, top, shape)))
+        return np.asarray(top + 10 * np.log10(average_power(db, top, shape)))
 
 
 def grey_levels(db: np.ndarray, top_db: float, floor_db: float, shape: tuple[int, int]) -> np.ndarray:
@@ -206,7 +206,7 @@ def grey_levels(db: np.ndarray, top_db: float, floor_db: float, shape: tuple[int
     return level[::-1]
 
 
-def _average_power(db: np.ndarray, top: float, shape: tuple[int, int]) -> np.ndarray:
+def average_power(db: np.ndarray, top: float, shape: tuple[int, int]) -> np.ndarray:
     """Power relative to `top` dB, resampled to `shape`: each new pixel is the mean over its own area."""
     out = np.empty((db.shape[0], shape[1]))
     for a in range(0, len(db), 256):  # in blocks: a large image is not held in float64
@@ -289,7 +289,7 @@ def _line_plot(db: np.ndarray, axes: PixelAxes, scale: _Scale, title: str | None
     if values.shape[1] > most:
         with np.errstate(divide="ignore"):
             highest = max(float(values.max()), -1e300)
-            values = highest + 10 * np.log10(_average_power(values, highest, (1, most)))
+            values = highest + 10 * np.log10(average_power(values, highest, (1, most)))
     peak = float(values.max())
     white, reference = (peak, "the maximum") if top_db is None else (float(top_db), _decibels(top_db))
     caption = "No sample has a signal." if peak == -np.inf else f"Maximum: {_decibels(peak)}."

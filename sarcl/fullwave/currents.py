@@ -52,17 +52,39 @@ class Currents:
     ended: str = "decayed"
 
 
+@dataclass(frozen=True)
+class RunOptions:
+    """How a run of the grid ends, and how it is computed.
+
+    tolerance   of the part of the currents that comes after the end of the run, relative (Decay)
+    most_steps  number of steps after which it ends in any case, rounded up to whole windows
+    progress    is called with the steps that are done and those that are expected
+    tile        planes of the grid that are updated together; None: as the device likes
+    max_bytes   bytes on the device to form echoes from the currents; None: as many as the device has
+    """
+
+    tolerance: float = 1e-4
+    most_steps: int = 20_000
+    progress: Callable[[int, int], None] | None = None
+    tile: int | None = None
+    max_bytes: float | None = None
+
+
 def currents(
-    device: Device, lattice: Lattice, target: Target, wave: PlaneWave, k: np.ndarray, *, absorber: int, gap: int,
-    tolerance: float = 1e-4, most_steps: int = 20_000, tile: int | None = None,
-    progress: Callable[[int, int], None] | None = None,
-) -> Currents:  # fmt: skip
+    device: Device,
+    lattice: Lattice,
+    target: Target,
+    wave: PlaneWave,
+    k: np.ndarray,
+    *,
+    absorber: int,
+    gap: int,
+    options: RunOptions = RunOptions(),
+) -> Currents:
     """Currents of a target under a plane wave at wavenumbers k (F,), rad/m, in vacuum.
 
     absorber   layers on each side;  gap  cells between these and the box where the wave enters
-    tolerance  of the part of the currents that comes after the end of the run, relative (Decay)
-    progress   is called with the steps that are done and those that are expected
-    The target is inside that box. The run ends as Decay says, or after most_steps, rounded up to whole windows.
+    The target is inside that box. The run ends as Decay says, or after options.most_steps.
     """
     low, high, centre = box_of(lattice, absorber, gap)
     _check_inside(lattice, target, low, high)
@@ -71,11 +93,12 @@ def currents(
     spectrum = table.spectrum(omega)
     _check_band(k, spectrum)
     every = sample_period(wave.pulse, omega, lattice.time_step)
-    fields = Fields(device, lattice, target, absorber=absorber, wave=table, tile=tile, every=every)
+    fields = Fields(device, lattice, target, absorber=absorber, wave=table, tile=options.tile, every=every)
     lists = (fields.edges, 0.5), (fields.faces, 0.0)  # E changes between two steps, H about a step
     sums = [device.zeros(8 * len(omega) * part.count) for part, _ in lists]
     window = SAMPLES * every
-    decay = Decay(tolerance, window)
+    decay = Decay(options.tolerance, window)
+    most_steps, progress = options.most_steps, options.progress
     while fields.step < most_steps and (fields.step < table.n_steps or not decay.ended):
         times = fields.step + every - 1 + every * np.arange(SAMPLES)
         for _ in range(window // BLOCK):

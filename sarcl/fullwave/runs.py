@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +13,7 @@ from ..opencl.device import Device
 from ._lists import PARTS, SAMPLES
 from .bodies.materials import RIM as RIM
 from .bodies.materials import Body, bodies
-from .currents import currents
+from .currents import RunOptions, currents
 from .fields import WAVE_STEPS
 from .formed_echoes import formed_echoes
 from .incident import COMPONENTS, SPACING, PlaneWave
@@ -139,7 +139,7 @@ def run_bytes(
 def run_cost(shape: np.ndarray, cell: float, area: float, band: tuple[float, float]) -> RunCost:
     """What one run takes on a grid of `shape` cells (3,) with a target of a surface of `area` m^2."""
     diagonal = float(np.linalg.norm(shape - 2 * (ABSORBER + GAP)))  # cells
-    pulse_steps = 2 * _pulse(band).half_length * SPEED_OF_LIGHT / (COURANT * cell)
+    pulse_steps = 2 * incident_pulse(band).half_length * SPEED_OF_LIGHT / (COURANT * cell)
     entries = ENTRIES * area / cell**2
     _, grid = run_bytes(shape, 0.4 * entries, 0.6 * entries, 0)
     return RunCost(grid, entries, int(pulse_steps + (1 + RINGING) * diagonal / COURANT))
@@ -171,29 +171,57 @@ def mirror_twins(
     return twins(mirror_axes(lattice, target), unit(tx - centre_of(lattice)), sent, k, radius)
 
 
+@dataclass(frozen=True, eq=False)
+class Anchor:
+    """Where the wave of a run comes from.
+
+    place  of the transmitter, m (3,);  sent  its polarisation, a unit vector (3,)
+    twin   the anchor that the run serves too, by a mirror; None: none
+    """
+
+    place: np.ndarray
+    sent: np.ndarray
+    twin: Twin | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Antennas:
+    """Antennas of P pulses, whose echoes are formed.
+
+    tx, rx    positions, m (P, 3)
+    received  unit vectors, polarisations at each pulse (Q, P, 3)
+    """
+
+    tx: np.ndarray
+    rx: np.ndarray
+    received: np.ndarray
+
+
 def run(
-    device: Device, lattice: Lattice, target: Target, band: tuple[float, float], k: np.ndarray, *,
-    anchor: tuple[np.ndarray, np.ndarray], twin: Twin | None, tx: np.ndarray, rx: np.ndarray, received: np.ndarray,
-    tolerance: float, most_steps: int, max_bytes: float, progress: Callable[[int, int], None] | None = None,
-) -> tuple[list[np.ndarray], RunEnd]:  # fmt: skip
+    device: Device,
+    lattice: Lattice,
+    target: Target,
+    band: tuple[float, float],
+    k: np.ndarray,
+    *,
+    anchor: Anchor,
+    antennas: Antennas,
+    options: RunOptions,
+) -> tuple[list[np.ndarray], RunEnd]:
     """One run: echoes of P pulses from the currents of an anchor, complex64 (P, Q, F), phase zero at the grid's centre;
     and those from the currents of its twin, where it has one.
 
-    band       lowest and highest frequency of the waveform, Hz;  k  wavenumbers of the echoes, rad/m (F,)
-    anchor     the transmitter's position, m (3,), and the polarisation that is sent there, a unit vector (3,)
-    tx, rx     positions of the antennas, m (P, 3);  received  unit vectors, polarisations at each pulse (Q, P, 3)
-    tolerance  part of the currents that may come after the end of the run
+    band  lowest and highest frequency of the waveform, Hz;  k  wavenumbers of the echoes, rad/m (F,)
     """
-    place, sent = anchor
-    sources = currents(
-        device, lattice, target, PlaneWave(centre_of(lattice) - place, sent, _pulse(band)), k, absorber=ABSORBER,
-        gap=GAP, tolerance=tolerance, most_steps=most_steps, progress=progress,
-    )  # fmt: skip
-    echoes = [formed_echoes(device, sources, tx, rx, received, max_bytes=max_bytes)]
-    if twin is not None:
-        echoes.append(mirrored_echoes(device, sources, twin, tx, rx, received, max_bytes=max_bytes))
+    wave = PlaneWave(centre_of(lattice) - anchor.place, anchor.sent, incident_pulse(band))
+    sources = currents(device, lattice, target, wave, k, absorber=ABSORBER, gap=GAP, options=options)
+    of_pulses = antennas.tx, antennas.rx, antennas.received
+    echoes = [formed_echoes(device, sources, *of_pulses, max_bytes=options.max_bytes)]
+    if anchor.twin is not None:
+        echoes.append(mirrored_echoes(device, sources, anchor.twin, *of_pulses, max_bytes=options.max_bytes))
     return echoes, RunEnd(sources.n_steps, sources.left)
 
 
-def _pulse(band: tuple[float, float]) -> Pulse:
+def incident_pulse(band: tuple[float, float]) -> Pulse:
+    """The pulse that runs send for a band, Hz: no narrower than WIDEST allows."""
     return Pulse.gaussian(min(band[0], WIDEST * band[1]), band[1])

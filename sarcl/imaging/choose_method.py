@@ -98,7 +98,7 @@ def choose(
     is_merging_possible = not task.weighs_pixels and direct.dtype == np.complex64
     if method == "direct" or not is_merging_possible or task.pairs < cost_model.SEARCH_PAYS:
         return direct
-    merged = _Float32(task, tolerance).factorized(devices)
+    merged = Float32Methods(task, tolerance).factorized(devices)
     if isinstance(merged, MethodChoice) and merged.cost < cost_model.MERGING_PAYS * direct.cost:
         return merged
     return direct
@@ -111,7 +111,7 @@ def _confirmed(candidate: Candidate) -> MethodChoice:
     return candidate
 
 
-class _Float32:
+class Float32Methods:
     """Plans in complex64 for one task and tolerance. ValueError where samples are too small for complex64.
 
     Errors of interpolation and rounding are proportional to the energy of the range profiles, the tolerance to the
@@ -146,7 +146,7 @@ class _Float32:
             return ToleranceUnreachable(self.tolerance, None, "float32 differences in a beam", remedy, how)
         candidate = refusal or self._planned("direct", direct_method.make_plan, direct_method.Direct, devices)
         if isinstance(candidate, ToleranceUnreachable):
-            return candidate.restated(self.tolerance, self._best())
+            return candidate.restated(self.tolerance, self.best())
         return candidate
 
     def factorized(self, devices: DeviceClass) -> Candidate:
@@ -177,7 +177,7 @@ class _Float32:
         how = f"{representation}: {reason}"
         return ToleranceUnreachable(self.tolerance, None, largest.name, largest.remedy, how)
 
-    def _best(self) -> float | None:
+    def best(self) -> float | None:
         """The smallest tolerance that `direct` meets: rounding takes half of it at most, and the plan the rest."""
         n_samples = self.task.raw.n_samples
         least = max(
@@ -225,14 +225,14 @@ class _Float32:
 def _direct(task: FocusingTask, tolerance: float, devices: DeviceClass, float64: bool) -> Candidate:
     """The direct method, in complex64 where that meets the tolerance, else in complex128 where the devices can."""
     if tolerance >= LEAST_TOLERANCE:
-        candidate = _Float32(task, tolerance).direct(devices)
+        candidate = Float32Methods(task, tolerance).direct(devices)
         if isinstance(candidate, MethodChoice):
             return candidate
         remedy = _without_float64(task, float64)
         if remedy:
             return candidate if candidate.remedy else candidate.restated(tolerance, None, remedy)
     elif task.antenna is not None or not float64:
-        best = reachable(lambda t: _confirmed(_Float32(task, t).direct(devices)), LEAST_TOLERANCE)
+        best = reachable(lambda t: _confirmed(Float32Methods(task, t).direct(devices)), LEAST_TOLERANCE)
         limit, how = (GAINS, "with an antenna") if task.antenna is not None else ("float32", "without float64")
         return ToleranceUnreachable(tolerance, best, limit, _without_float64(task, float64), how)
     return _float64(task, tolerance)
@@ -251,12 +251,12 @@ def _factorized(task: FocusingTask, tolerance: float, devices: DeviceClass, floa
     """Sub-apertures, in complex64 alone. Where they cannot meet the tolerance, the best one is found by a search."""
     candidate: Candidate = ToleranceUnreachable(tolerance, None, PROFILES, how="with sub-apertures")
     if tolerance >= LEAST_TOLERANCE:
-        candidate = _Float32(task, tolerance).factorized(devices)
+        candidate = Float32Methods(task, tolerance).factorized(devices)
     if isinstance(candidate, MethodChoice):
         return candidate
     direct = _direct(task, tolerance, devices, float64)
     least = max(tolerance, LEAST_TOLERANCE)
-    best = reachable(lambda t: _confirmed(_Float32(task, t).factorized(devices)), least, STEP_OF_SEARCH)
+    best = reachable(lambda t: _confirmed(Float32Methods(task, t).factorized(devices)), least, STEP_OF_SEARCH)
     if isinstance(direct, MethodChoice):
         remedy = "method='direct' can"
     elif best is None:

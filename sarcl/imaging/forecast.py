@@ -38,7 +38,7 @@ def forecast_of(
     """
     devices = open_devices(options.device)
     working, repeated = np.sum([_in_blocks(task, chosen, d, options.budget(d)) for d in devices], axis=0)
-    rate = _rate(devices)
+    rate = rate_of(devices)
     # seconds per pixel, for all rows that see it, at cost 1
     seconds = float(task.raw.n_rows * profile_energy.share(task) / rate)
     besides = planning + float(repeated) / len(devices) / rate
@@ -77,7 +77,7 @@ def _work(task: FocusingTask, chosen: MethodChoice) -> float:
     return task.grid.size * chosen.cost + extra / rows
 
 
-def _rate(devices: list[Device]) -> float:
+def rate_of(devices: list[Device]) -> float:
     """Contributions per second of all devices together; drivers of the same CPU share its cores."""
     return sum(speed(d) for d in devices if not d.is_cpu) + max((speed(d) for d in devices if d.is_cpu), default=0.0)
 

@@ -35,7 +35,7 @@ def lengths(n_samples: int) -> tuple[int, ...]:
 
 
 @functools.lru_cache(maxsize=256)
-def _candidates(n_samples: int, carrier: float) -> tuple[tuple[int, float, int], ...]:
+def interpolators(n_samples: int, carrier: float) -> tuple[tuple[int, float, int], ...]:
     """Taps, oversampling and profile length of every interpolator for rows of n_samples."""
     out = []
     for taps in interpolation.TERMS:
@@ -55,7 +55,7 @@ def _by_cost(
     """Cost, taps, oversampling and profile length of every interpolator, the cheapest first."""
     candidates = [
         (pairs_per_row * gathering.of_taps(*one) + cost_model.profile(one[2]), *one)
-        for one in _candidates(n_samples, carrier)
+        for one in interpolators(n_samples, carrier)
     ]
     return tuple(sorted(candidates, key=lambda candidate: candidate[0]))
 
@@ -63,7 +63,7 @@ def _by_cost(
 @functools.lru_cache(maxsize=256)
 def least_error(n_samples: int, carrier: float = 0.0) -> float:
     """The smallest error that `choose_interpolator` can meet, for rows of n_samples."""
-    least, candidates = np.inf, _candidates(n_samples, carrier)
+    least, candidates = np.inf, interpolators(n_samples, carrier)
     for bound, taps, oversample in sorted((interpolation.lower_bound(t, s), t, s) for t, s, _ in candidates):
         if bound < least:
             least = min(least, interpolation.interpolator(taps, oversample).error)

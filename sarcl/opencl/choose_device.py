@@ -44,7 +44,7 @@ def open_device(choice: DeviceChoice | None = None) -> Device:
             matching = [tried(info.index) for info, _ in listed() if info.kind == kind and _matches(info, name)]
             working = [info for info in matching if info.works]
             if working:
-                return _open(max(working, key=lambda i: (i.rate, -i.index)).index)
+                return open_listed(max(working, key=lambda i: (i.rate, -i.index)).index)
     if not any(info.works for info in devices()):
         remedy = _cache_folder.prepare() or ("" if any(_linker.is_missing(i.platform) for i in devices()) else REMEDY)
         raise NoDeviceError(f"no OpenCL device could build a kernel. Found: {_listing()}. {remedy}".strip())
@@ -61,7 +61,7 @@ def with_float64(device: Device) -> Device:
             f"edges of shadows need float64, which {device.info.name!r} lacks, as every other OpenCL device here does; "
             f"pass shadows=False, or install a driver for the CPU beside it. {REMEDY}"
         )
-    return _open(max(able, key=lambda i: (i.rate, -i.index)).index)
+    return open_listed(max(able, key=lambda i: (i.rate, -i.index)).index)
 
 
 def _matches(info: DeviceInfo, choice: object) -> bool:
@@ -108,5 +108,6 @@ def split_choice(choice: object) -> list[Any]:
 
 
 @once
-def _open(index: int) -> Device:
+def open_listed(index: int) -> Device:
+    """The device of this index in the list, opened once."""
     return Device(tried(index), listed()[index][1])

@@ -61,7 +61,7 @@ def rows(
     if engine is None and device is not None and on_device(device, data.shape[1], data.dtype):
         engine = "reikna"
     if device is not None and engine == "reikna":
-        return _reikna(device, data, inverse)
+        return reikna_rows(device, data, inverse)
     return _scipy_transform()(data, (1,), not inverse, 0, data if overwrite else None, threads())
 
 
@@ -102,7 +102,7 @@ def in_place(device: Device, buffer: Buffer, shape: tuple[int, int], dtype: DTyp
     Where `on_device`. The first call for a shape builds programs; a plan holds `temporary_bytes` for each row.
     """
     with _turns:
-        thread, compiled = _plan(device, shape, np.dtype(dtype).char)
+        thread, compiled = compiled_plan(device, shape, np.dtype(dtype).char)
         rows = thread.array(shape, np.dtype(dtype), base=buffer)
         compiled(rows, rows)
 
@@ -121,7 +121,7 @@ def rows_at_once(device: Device, length: int) -> int:
     return max(1, int(samples) // length)
 
 
-def _reikna(device: Device, data: np.ndarray, inverse: bool) -> np.ndarray:
+def reikna_rows(device: Device, data: np.ndarray, inverse: bool) -> np.ndarray:
     """The FFT in batches of one size, for which one program is built; the last batch is filled with what was there."""
     data, out = np.ascontiguousarray(data), np.empty(data.shape, data.dtype)
     n, length = data.shape
@@ -134,7 +134,7 @@ def _reikna(device: Device, data: np.ndarray, inverse: bool) -> np.ndarray:
         part = slice(start, start + most)
         device.write(buffer, data[part])
         with _turns:
-            thread, compiled = _plan(device, shape, data.dtype.char)
+            thread, compiled = compiled_plan(device, shape, data.dtype.char)
             rows = thread.array(shape, data.dtype, base=buffer)
             enqueued = time.perf_counter()
             launches = compiled(rows, rows, inverse)
@@ -149,13 +149,14 @@ def _reikna(device: Device, data: np.ndarray, inverse: bool) -> np.ndarray:
 
 
 @functools.lru_cache(maxsize=16)
-def _plan(device: Device, shape: tuple[int, ...], kind: str) -> tuple[Any, Any]:
+def compiled_plan(device: Device, shape: tuple[int, ...], kind: str) -> tuple[Any, Any]:
+    """Thread and compiled FFT of reikna for batches of this shape and type (`kind`: NumPy's character of it)."""
     from reikna.cluda import ocl_api
     from reikna.core import Type
     from reikna.fft import FFT
 
     # plans hold buffers that must go before the interpreter takes down what frees them
-    atexit.register(_plan.cache_clear)
+    atexit.register(compiled_plan.cache_clear)
     thread = ocl_api().Thread(device.queue)
     with quiet():
         return thread, FFT(Type(np.dtype(kind), shape), axes=(1,)).compile(thread)

@@ -63,13 +63,13 @@ def build(context: pyopencl.Context, text: str, options: list[str]) -> pyopencl.
     import pyopencl
 
     if context.devices[0].platform.name == POCL:
-        _check_file_limit()
+        check_file_limit()
         with suppress(pyopencl.Error):
             return pyopencl.Program(context, source("builtins.clh") + "\n" + text).build([*options, "-D_OPENCL_H_"])
     return pyopencl.Program(context, text).build(options)
 
 
-def _check_file_limit() -> None:
+def check_file_limit() -> None:
     """OSError where files may be so small that PoCL's compiler, which writes what it builds, would end the process."""
     try:
         from resource import RLIM_INFINITY, RLIMIT_FSIZE, getrlimit

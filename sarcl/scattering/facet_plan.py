@@ -30,9 +30,7 @@ LADDER = 2.0 ** (1 / 2)  # ratio of the edge lengths that are tried
 PIECES = 1.5  # pieces per facet, over the square of its longest edge over theirs, about
 SHARE = 0.6  # of the tolerance, for the facets themselves; the rest is for ranges and interpolation
 MOST_FACETS = 50_000_000
-# Facets times pulses times samples that are added up in float64, in about a second, where float32 does not suffice, or
-# needs this many times as many facets
-FLOAT64_TERMS, WORTH_FLOAT32 = 4e6, 64
+WORTH_FLOAT32 = 64  # ratio of facets: float32 is not tried with more of them, where sums may be in float64
 # bytes per cut facet of an echo: corners, normals, materials and illumination on the host, measured with 1e6 facets
 FACET_BYTES = 512
 DARK = 30.0  # amplitude ratio of all polarisations to the cross-polarised ones asked for, above which errors name it
@@ -87,6 +85,8 @@ class CutLimits:
     max_bytes  that the other cut facets may take; twice the facets of the scene are allowed whatever it is
     profiles   least error of the range profiles that cut facets are spread into
     terms      pulses times samples: with few of them and few facets, sums may be in float64; inf: never
+    most       facets in all
+    float64_terms  facets times pulses times samples that may be added up in float64, in about a second
     """
 
     finest: float
@@ -96,14 +96,15 @@ class CutLimits:
     max_bytes: float
     profiles: float
     terms: float
+    most: float = MOST_FACETS
+    float64_terms: float = 4e6
 
 
 def plan_facets(tolerance: float, view: FacetView, weights: WeightError, limits: CutLimits) -> FacetPlan:
     """The cheapest plan for facets whose error is at most SHARE of `tolerance`, relative to the facets as given.
 
     weights  errors of the antenna weights
-    ToleranceUnreachable where more facets would be needed than the limits allow, or than 50 million, with the best
-    tolerance of fewer.
+    ToleranceUnreachable where more facets would be needed than the limits allow, with the best tolerance of fewer.
     """
     search = _PlanSearch(tolerance, view, weights, limits)
     edge = search.first_edge
@@ -155,13 +156,13 @@ class _PlanSearch:
         on_host = self.rough[0] + float(np.maximum(1.0, PIECES * (self.longest[mirror] / edge) ** 2).sum())
         count = on_host + self.rough[1]
         self.fits = on_host <= self.in_memory
-        if not self.fits or count > MOST_FACETS:
+        if not self.fits or count > limits.most:
             return False
         if self.exact is not None and count > WORTH_FLOAT32 * self.exact.n_facets:
             return False
         # the kernels know neither forward scatter nor thin sheets
         on_host = self.view.antennas.forward or bool(self.view.scene.sheets.any())
-        is_small = on_host or (count * limits.terms <= FLOAT64_TERMS and self.cross_ratio <= DARK)
+        is_small = on_host or (count * limits.terms <= limits.float64_terms and self.cross_ratio <= DARK)
         rounding = self._rounding(edge) + self.weights.rounding
         gain, shape = self._shape(edge, 0.0 if is_small else rounding) if mirror.any() else (1.0, 0.0)
         if is_small and self.exact is None and gain * shape <= SHARE * self.tolerance:
@@ -233,9 +234,9 @@ class _PlanSearch:
             return ToleranceUnreachable(tolerance, reach, limit, remedy, how=how)
         if tolerance <= self.least_rounding < np.inf:  # inf: even the largest pieces are too many
             return ToleranceUnreachable(tolerance, reach, float32, how="with facets in float32")
-        most, remedy = MOST_FACETS if self.fits else self.in_memory, "take a smaller scene"
+        most, remedy = self.limits.most if self.fits else self.in_memory, "take a smaller scene"
         how = f"without cutting these facets into more than {most:,.0f}"
-        if most < MOST_FACETS:
+        if most < self.limits.most:
             memory = size_text(self.limits.max_bytes)
             how += f" (about {FACET_BYTES} bytes per facet of max_bytes, {memory})"
             remedy += ", a track farther away, or a larger max_bytes"

@@ -25,7 +25,8 @@ ORDER = 4  # nodes that a cubic goes through
 SPACINGS = (64, 32, 16, 8, 4)  # pulses between nodes that are tried
 FACETS, WINDOWS = 200, 6  # samples: facets, and intervals between nodes along the track
 STEEP_WINDOWS = 32  # such intervals where facets pass below an antenna, each at another pulse
-WORTH = 2e7  # pairs of facet and pulse: below, estimating the error would cost more than the nodes save
+# Pairs of facet and pulse below which estimating the error costs more than the nodes save
+WORTH = 2e7
 MOST_TURN = 1.0  # rad between nodes, of the phase from a facet's corner to its centre: no specular flash lies between
 SAFETY = 2.0  # the error is estimated from samples
 
@@ -81,13 +82,15 @@ def plan_pulse_nodes(
     vertical: np.ndarray,
     frequency: float,
     tolerance: float,
+    worth: float = WORTH,
 ) -> PulseNodes:
     """The widest nodes whose error is at most `tolerance`, relative to facets at random phases.
 
-    frequency  the highest, Hz. For mirrors the spacing is also limited by MOST_TURN, whatever the samples say.
+    frequency  the highest, Hz;  worth  pairs of facet and pulse, from which on nodes are looked for
+    For mirrors the spacing is also limited by MOST_TURN, whatever the samples say.
     """
     n_pulses = len(weights.geometry)
-    if len(part) * n_pulses < WORTH or n_pulses < least_pulses(min(SPACINGS)):
+    if len(part) * n_pulses < worth or n_pulses < least_pulses(min(SPACINGS)):
         return every(n_pulses)
     sample, share = sample_of(part, np.random.default_rng(0))
     geometry = weights.geometry

@@ -29,8 +29,6 @@ from .facets import FacetSet
 from .random_surface import RANDOM_STREAMS, ROUND, with_facets
 
 KERNELS = "facet_pieces.cl"
-# Pieces that are on a device together: some 200 MB of them, beside as many that are being made
-BLOCK = 2**21
 PIECE_BYTES = 84  # bytes of a piece on the device: offsets, edges, reflectivity, random numbers
 # of edges of what a work-item cuts, over those of pieces: some hundred pieces each, of which a path has a dozen cuts
 COARSE = 16
@@ -51,6 +49,7 @@ class RoughPieces:
     facets  m (k, 3, 3), parts of the scene's facets `of` (k,): large ones in several parts;  counts  of pieces (k,)
     lengths  of the facets' edges, m (k, 3), by which their longest is chosen
     subset  numbers, rising, of the pieces that count (n,); None: all of these facets
+    block   pieces that are on the device together: some 200 MB of them, beside as many that are being made
     """
 
     device: Device
@@ -62,28 +61,31 @@ class RoughPieces:
     of: np.ndarray
     counts: np.ndarray
     subset: np.ndarray | None = None
+    block: int = 2**21
 
     @classmethod
-    def cut(cls, device: Device, scene: Scene, cell: float, seed: int, is_cut: np.ndarray) -> RoughPieces:
-        """Pieces of facets (k,) bool, which must be `suited` to a device. MemoryError above 50 million pieces."""
+    def cut(
+        cls, device: Device, scene: Scene, cell: float, seed: int, is_cut: np.ndarray, most: int = MOST_FACETS
+    ) -> RoughPieces:
+        """Pieces of facets (k,) bool, which must be `suited` to a device. MemoryError above `most` pieces."""
         of = np.flatnonzero(is_cut)
         facets = scene.triangles if is_cut.all() else scene.triangles[of]
         lengths = edges(facets).T
         longest = lengths.max(axis=1)
-        refuse_many(facets, ROUND * cell, MOST_FACETS)
-        if np.maximum(longest / (ROUND * cell), 1.0).sum() > MOST_FACETS:  # pieces along one edge of each
-            raise too_many(ROUND * cell, MOST_FACETS)
+        refuse_many(facets, ROUND * cell, most)
+        if np.maximum(longest / (ROUND * cell), 1.0).sum() > most:  # pieces along one edge of each
+            raise too_many(ROUND * cell, most)
         large = longest > COARSE * ROUND * cell
         if large.any():
-            parts, sizes, whole = cut_lengths(facets[large], COARSE * ROUND * cell, MOST_FACETS)
+            parts, sizes, whole = cut_lengths(facets[large], COARSE * ROUND * cell, most)
             facets, of = np.concatenate([facets[~large], parts]), np.concatenate([of[~large], of[large][whole]])
             lengths = np.concatenate([lengths[~large], sizes])
         order = morton_order(centroids(facets))
         counts = np.zeros(len(of), np.int32)
         pieces = cls(device, scene, cell, seed, facets[order], lengths[order], of[order], counts)
         pieces = replace(pieces, counts=pieces._counted())
-        if len(pieces) > MOST_FACETS or pieces.counts.min(initial=1) == 0:
-            raise too_many(ROUND * cell, MOST_FACETS)
+        if len(pieces) > most or pieces.counts.min(initial=1) == 0:
+            raise too_many(ROUND * cell, most)
         return pieces
 
     @staticmethod
@@ -117,11 +119,11 @@ class RoughPieces:
         return replace(self, **parts, subset=None)
 
     def blocks(self) -> Iterator[tuple[slice, RoughPieces]]:
-        """The pieces in parts of about BLOCK, all of each facet in one: numbers of the pieces, and these."""
+        """The pieces in parts of about `block`, all of each facet in one: numbers of the pieces, and these."""
         ends, first = np.cumsum(self.counts, dtype=np.int64), 0
         while first < len(ends):
             begin = int(ends[first] - self.counts[first])
-            stop = int(np.searchsorted(ends, begin + BLOCK)) + 1
+            stop = int(np.searchsorted(ends, begin + self.block)) + 1
             last = int(ends[min(stop, len(ends)) - 1])
             part, numbers = self.rows(slice(first, stop)), slice(begin, last)
             if self.subset is not None:

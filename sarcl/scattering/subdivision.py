@@ -96,7 +96,7 @@ def plan_cut(
     """How to cut a scene's facets within `share` of a tolerance.
 
     weights  errors of the antenna weights;  max_edge  as `sarcl.echo` takes it
-    device   that may cut rough facets, or None;  limits  max_bytes, profiles and terms of `CutLimits`
+    device   that may cut rough facets, or None;  limits  other fields of `CutLimits`
     ValueError for another max_edge, ToleranceUnreachable where the share cannot be met.
     """
     finest = np.inf

@@ -20,7 +20,6 @@ from .spreading import ChannelView
 CANDIDATES = 256  # pulses among which those that are checked are drawn
 MOST_DRAWS = 16  # pulses, and frequencies at each of them
 FEWEST_DRAWS, MANY_FACETS = (4, 2), 2_000_000  # up to so many facets, and above
-FACET_SAMPLES = 256 * 20_000  # facets times samples: two or three seconds
 # s, to recompute the share of a facet in a sample, on one core; of a point, and where its gain changes over the band
 PER_FACET, PER_POINT, PER_GAIN = 5e-7, 1.5e-7, 1.3e-6
 PER_LIT_PART = 5e-3  # s, to recompute the lit part of a facet, past some ten occluders, on one core
@@ -36,8 +35,8 @@ class PulseRows(Protocol):
 
 def draws_of(scene: SceneEchoes) -> int:
     """Number of pulses that are checked, and of samples at each: 16, fewer where there are over 20 000 facets."""
-    n = sum(map(len, scene.facets))
-    return int(np.clip(np.sqrt(FACET_SAMPLES / max(n, 1)), FEWEST_DRAWS[n > MANY_FACETS], MOST_DRAWS))
+    n, most = sum(map(len, scene.facets)), scene.request.limits.checked_facets
+    return int(np.clip(np.sqrt(most / max(n, 1)), FEWEST_DRAWS[n > MANY_FACETS], MOST_DRAWS))
 
 
 def seconds_to_check(scene: SceneEchoes) -> float:

@@ -13,6 +13,8 @@ from ..numerics.run_options import Progress as Progress
 from ..opencl.choose_device import open_device
 from ..opencl.device import Device
 from ..opencl.memory_budget import budget
+from ..scattering.facet_plan import MOST_FACETS
+from ..scattering.pulse_nodes import WORTH
 from ..scene.scene import Scene
 from .scene_options import SceneOptions
 
@@ -28,12 +30,23 @@ class EchoLimits:
     most_looks        such pairs, up to which they are clipped where samples do not meet the tolerance: about a minute
     prepared_share    of the modelled job, and
     prepared_seconds  s: a forecast may take the larger of these to prepare the scene
+    facets            number into which a scene may be cut
+    float64_terms     facets times pulses times samples that may be added up in float64, in about a second
+    kept_pieces       share of the memory for blocks: where pieces of rough facets take more of the device, they are
+                      made anew for each block of pulses
+    own_amplitudes    pairs of facet and pulse, below which every pulse has amplitudes of its own
+    checked_facets    facets times samples that are recomputed to check echoes: two or three seconds
     """
 
     few_looks: float = 2e6
     most_looks: float = 5e7
     prepared_share: float = 0.06
     prepared_seconds: float = 0.025
+    facets: float = MOST_FACETS
+    float64_terms: float = 4e6
+    kept_pieces: float = 0.5
+    own_amplitudes: float = WORTH
+    checked_facets: float = 256 * 20_000
 
 
 @dataclass(frozen=True, eq=False)

@@ -162,8 +162,10 @@ def plan_scene(
         # lit parts are computed of pieces on the host; without bands nothing is added on a device
         on_device = bands and (not request.shadows or samples_shadows(request, seen))
         device = request.device if on_device else None
-        limits = {"max_bytes": request.host, "profiles": profiles, "terms": terms}
-        subdivision = plan_cut(share, view, weight_error, seen.waveform, max_edge, device, **limits)
+        subdivision = plan_cut(
+            share, view, weight_error, seen.waveform, max_edge, device, max_bytes=request.host, profiles=profiles,
+            terms=terms, most=request.limits.facets, float64_terms=request.limits.float64_terms,
+        )  # fmt: skip
         room = share / subdivision.gain - subdivision.plan.predicted_error
         if not subdivision.plan.is_float64:  # pieces are not counted yet
             _profiles_fit(bands, room, len(scene.triangles) * MOST_FACETS, share / subdivision.gain)

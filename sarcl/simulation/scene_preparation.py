@@ -25,9 +25,6 @@ from .scene_plan import SHADOWS, ScenePlan, parts_of, samples_shadows, with_clip
 
 LEAST = 1e-30  # largest amplitude of a scene below which echoes approach the smallest numbers of complex64
 LARGEST = 1e30  # amplitude whose sums and spectra still fit in complex64
-# Share of the memory for blocks that pieces of rough facets may take on the device; where they take more, they are made
-# anew for each block of pulses
-KEPT_PIECES = 0.5
 # Share of a tolerance for what is left out outside the beam: as little as this, since it may be a specular reflection
 UNSEEN = 1e-3
 
@@ -139,7 +136,7 @@ def _tiled_facets(
         return ()
     seen = plan.seen
     n_rough = sum(len(part) for part in facets if isinstance(part, RoughFacets))
-    stays = PIECE_BYTES * n_rough <= KEPT_PIECES * plan.request.budget
+    stays = PIECE_BYTES * n_rough <= plan.request.limits.kept_pieces * plan.request.budget
     return tuple(
         TiledFacets(plan.request, some, subdivision.plan_of(some), seen.antennas, seen.waveform, weights, stays=stays)
         for part in facets

@@ -12,8 +12,6 @@ import numpy as np
 import pytest
 
 import sarcl
-from sarcl.analysis._image_interpolator import ImageInterpolator
-from sarcl.analysis.point_response import _axes
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.numerics.windows import weights
 from sarcl.reference.quality import measure as brute_force
@@ -78,9 +76,19 @@ class Pass:
 
     def image(self, grid, points):
         data = self.value(points)(grid.positions.reshape(-1, 3)).reshape(grid.shape)
-        middle = [(end[N // 2 - 1] + end[N // 2]) / 2 for end in (self.tx, self.rx)]
-        gain = self.weights.sum() ** 2
+        middle, gain = self.middle(), self.weights.sum() ** 2
         return sarcl.Image(data, grid, gain=gain, frequency=self.frequency, tx=middle[0], rx=middle[1])
+
+    def middle(self):
+        """Positions of both antennas at mid-aperture, m."""
+        return [(end[N // 2 - 1] + end[N // 2]) / 2 for end in (self.tx, self.rx)]
+
+    def axes(self, grid, place):
+        """Unit vectors of range and cross-range on a plane grid, at a place on it, m."""
+        gradient = sum((np.array(place) - end) / np.linalg.norm(np.array(place) - end) for end in self.middle())
+        along = gradient - (gradient @ grid.normal) * grid.normal
+        along /= np.linalg.norm(along)
+        return along, np.cross(grid.normal, along)
 
 
 CENTRE, AWAY = (0.0, 0.0, 0.0), (28.0, 28.5, 0.0)  # the second 40 m off
@@ -127,7 +135,7 @@ def test_figures_are_those_of_brute_force_on_the_exact_image(case, window):
     want = brute_force(
         seen.value({place: 2.0}),
         place,
-        _axes(ImageInterpolator.about(image, 40, 40), np.array(place)),
+        seen.axes(grid, place),
         seen.cells("ground"),
     )
     np.testing.assert_allclose(got.irw, want["irw"], rtol=2e-4)
@@ -188,11 +196,9 @@ def test_the_interpolator_follows_a_sinc_just_above_its_nyquist_rate():
         return np.sinc(0.8 * (row - 34.6)) * np.sinc(0.78 * (column - 35.1)) * carrier
 
     image = sarcl.Image(value(grid.positions), grid, frequency=seen.frequency, tx=middle)
-    surface = ImageInterpolator.about(image, 35, 35)
-    index = np.random.default_rng(0).uniform(20, 50, (2000, 2))
-    position = grid.at(index[:, 0], index[:, 1])
-    assert np.abs(surface(position) - value(position)).max() < 1e-4
     got = sarcl.measure(image)
+    for cut, axis in zip(got.cuts, seen.axes(grid, got.position), strict=True):
+        assert np.abs(cut.values - value(got.position + cut.distance[:, None] * axis)).max() < 1e-4
     np.testing.assert_allclose(grid.index(got.position), [34.6, 35.1], atol=1e-4)
     np.testing.assert_allclose(got.irw, HALF / np.array([0.78, 0.8]) * grid.spacing[0], rtol=1e-4)
     np.testing.assert_allclose(got.pslr, -13.26, atol=0.005)
@@ -304,13 +310,9 @@ def test_a_cut_ends_before_the_border_of_a_grid_whose_rows_are_not_even():
     y, x = rows + 0.004 * (rows - 40.0) ** 2, columns - 45.0
     positions = np.stack([*np.broadcast_arrays(x, y[:, None]), np.zeros((120, 90))], axis=-1)
     grid = sarcl.ImageGrid.zero_doppler(rows * 1e-3, 1e5 + columns, positions)
-    data = np.exp(-((rows[:, None] - 40.0) ** 2 + (columns - 45.0) ** 2) / 18).astype(np.complex64)
-    image = sarcl.Image(data, grid, frequency=1e3, tx=(-1e5, 0, 1e5))
-    interpolated = ImageInterpolator.about(image, 40, 45)
-    middle, along = grid.at(40, 45), np.array([0.0, 1.0, 0.0])
-    room = interpolated.room(middle, along)
-    assert 15 < room < 40
-    interpolated(middle + room * np.array([[-1.0], [1.0]]) * along)  # no ValueError
+    data = (np.sinc((rows[:, None] - 40) / 4) * np.sinc((columns - 45) / 4)).astype(np.complex64)
+    got = sarcl.measure(sarcl.Image(data, grid, frequency=1e3, tx=(-1e5, 0, 1e5)))  # no ValueError
+    assert 15 < got.cuts[1].distance.max() < 10 * got.irw[1] - 2  # y = 6.4 m ... 40 m
 
 
 def test_the_response_prints_as_a_table_with_units(pair):

@@ -6,13 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.cases import noise_on, thinned
+from helpers.cases import noise_on, planned_within, thinned
 
 import sarcl
 from sarcl.base import host_memory
 from sarcl.base.errors import ToleranceUnreachable
 from sarcl.opencl.choose_device import open_device
-from sarcl.simulation import echo_request
 
 OVERHEAD = np.stack([np.zeros(16), np.linspace(-5, 5, 16), np.full(16, 1e3)], axis=1)
 
@@ -49,14 +48,19 @@ def test_facets_may_be_cut_in_268_mb_whatever_max_bytes_is(near_facets):
         sarcl.plan(sarcl.echo, *near_facets, max_bytes=1e7, tolerance=1e-5)
 
 
-def test_facets_are_cut_within_max_bytes_or_a_quarter_of_the_memory(near_facets, monkeypatch):
-    monkeypatch.setattr(echo_request, "LEAST_HOST", 1e6)
+def test_facets_are_cut_within_the_memory_for_them(near_facets):
     with pytest.raises(ToleranceUnreachable, match=r"more than 19,531 .*max_bytes, 10 MB.*or a larger max_bytes"):
-        sarcl.plan(sarcl.echo, *near_facets, max_bytes=1e7, tolerance=1e-4)
-    sarcl.plan(sarcl.echo, *near_facets, max_bytes=1e7, tolerance=0.1)
-    monkeypatch.setattr(host_memory, "installed", lambda: 4e7)
-    with pytest.raises(ToleranceUnreachable, match=r"more than 19,531 "):
-        sarcl.plan(sarcl.echo, *near_facets, tolerance=1e-4)
+        planned_within({"host": 1e7}, sarcl.echo, *near_facets, tolerance=1e-4).forecast()
+    planned_within({"host": 1e7}, sarcl.echo, *near_facets, tolerance=0.1).forecast()
+
+
+def test_the_memory_for_facets_is_max_bytes_or_a_quarter_of_what_is_installed(near_facets, monkeypatch):
+    def memory(**options):
+        return sarcl.echo.planned(*near_facets, **options).task.request.host
+
+    assert memory(max_bytes=1e9) == 1e9 and memory(max_bytes=1e7) == 2**28
+    monkeypatch.setattr(host_memory, "installed", lambda: 8e9)
+    assert memory() == 2e9
 
 
 def test_masked_values_are_refused_wherever_samples_come_from(tmp_path):

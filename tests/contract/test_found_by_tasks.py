@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.cases import image_error, noise_on, straight
+from helpers.cases import image_error, noise_on, planned_within, straight
 
 import sarcl
 from sarcl.base.tolerances import reachable
@@ -249,13 +249,12 @@ def test_refusals_without_a_best_tolerance_have_a_remedy(device):
         sarcl.backproject(raw, GRID, tolerance=1e-8, method="factorized", device=device.without_fp64())
 
 
-def test_facets_refused_for_their_number_are_told_so(monkeypatch):
+def test_facets_refused_for_their_number_are_told_so():
     """Where even the largest pieces were too many, float32 was blamed, whose rounding had not been looked at."""
-    monkeypatch.setattr("sarcl.scattering.facet_plan.MOST_FACETS", 1)
     track = sarcl.Trajectory.line(start=(-700, -5, 700), velocity=(0, 10, 0), prf=4.0, n_pulses=4)
     chirp = sarcl.Waveform.chirp(center=1e10, bandwidth=1e8, duration=1e-6)
     with pytest.raises(sarcl.ToleranceUnreachable, match="without cutting these facets into more than 1; take a small"):
-        sarcl.echo(sarcl.shapes.plate((0.3, 0.2)), chirp, track)
+        planned_within({"facets": 1}, sarcl.echo, sarcl.shapes.plate((0.3, 0.2)), chirp, track).run()
 
 
 @pytest.mark.slow

@@ -12,17 +12,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.array_cases import TONE, line, passing
-from helpers.cases import SCENARIO, noise_history, noise_on, straight
+from helpers.cases import SCENARIO, noise_history, noise_on, planned_within, straight
 
 import sarcl
 from sarcl import pointing, shapes
 from sarcl.base.errors import ToleranceUnreachable
 from sarcl.base.text import tolerance_text
 from sarcl.base.tolerances import reachable, rounded_up
+from sarcl.imaging.choose_method import choose
+from sarcl.imaging.focusing_task import make_task
 from sarcl.opencl.choose_device import open_device
 from sarcl.scenario.scenario import loads
 
+# so that the best tolerance takes a second, not an hour, and sums in float32, as more facets, pulses and samples do
+FEW = {"facets": 20_000, "float64_terms": 0.0}
 PLANE = sarcl.ImageGrid.plane(shape=(40, 40), spacing=0.3)
+LARGE = sarcl.ImageGrid.plane(shape=(500, 500), spacing=0.3)  # so large that sub-apertures may pay
 LISTED = sarcl.ImageGrid.points(np.random.default_rng(0).uniform(-3e3, 3e3, (2000, 3)))
 CHIRP = sarcl.Waveform.chirp(center=9e9, bandwidth=300e6, duration=1e-6)
 POINTS = sarcl.Scene.points([[0.0, 0, 0], [1, 2, 0]])
@@ -47,27 +52,32 @@ def aside():
     return pointing.spotlight(track(), (0, 60.0, 0))
 
 
-def echoed(scene, **options):
-    return lambda tolerance: sarcl.echo(
-        scene, CHIRP, options.get("track", track()), shadows=False, tolerance=tolerance, check=False,
-        **{k: v for k, v in options.items() if k != "track"},
-    )  # fmt: skip
+def echoed(scene, limits=FEW, **options):
+    return lambda tolerance: planned_within(
+        limits, sarcl.echo, scene, CHIRP, options.get("track", track()), shadows=False, tolerance=tolerance,
+        check=False, **{k: v for k, v in options.items() if k != "track"},
+    ).run()  # fmt: skip
 
 
 def channels(scene):
-    return lambda tolerance: sarcl.echo(
-        scene, TONE, passing(4), array=ARRAY, reference=(0, 0, 0), range_window=(-3.6, 3.6), tolerance=tolerance,
-        check=False, shadows=False,
-    )  # fmt: skip
+    return lambda tolerance: planned_within(
+        FEW, sarcl.echo, scene, TONE, passing(4), array=ARRAY, reference=(0, 0, 0), range_window=(-3.6, 3.6),
+        tolerance=tolerance, check=False, shadows=False,
+    ).run()  # fmt: skip
 
 
 def focused(raw, grid, **options):
     return lambda tolerance: sarcl.backproject(raw, grid, tolerance=tolerance, check=False, **options)
 
 
+def method_for(raw, grid, method="auto"):
+    """As focused, but only planned, and for tolerances too that verbs refuse for their size: below 1e-11."""
+    return lambda tolerance: choose(make_task(raw, grid, None, None, False, True), method, tolerance)
+
+
 def field(tolerance):
     return sarcl.beam(
-        sarcl.AntennaArray.linear(9, spacing=0.015, frequency_step=1e6), 10e9, times=[0.1], positions=[[3.6e7, 0, 0]],
+        sarcl.AntennaArray.linear(9, spacing=0.015, frequency_step=1e6), 1e11, times=[0.1], positions=[[3.6e9, 0, 0]],
         tolerance=tolerance,
     )  # fmt: skip
 
@@ -77,16 +87,16 @@ SMOOTH = noise_on(straight(128), n_samples=32)
 RAW = noise_history()
 # name: (what is made at a tolerance, tolerance it refuses, what limits it)
 REFUSED = {
-    "float32": (focused(RAW, PLANE, device=None), 1e-16, "float64 range profiles"),
+    "float32": (method_for(RAW, PLANE), 1e-16, "float64 range profiles"),
     "float32 without float64": (lambda t: focused(RAW, PLANE, device=no_fp64())(t), 2e-7, "float32"),
-    "float64 of listed points": (focused(RAW, LISTED), 3.25e-17, "float64 range profiles"),
+    "float64 of listed points": (method_for(RAW, LISTED), 3.25e-17, "float64 range profiles"),
     "sub-apertures": (focused(SMOOTH, PLANE, method="factorized"), 1.25e-6, "decimation of the pulses"),
     "sub-apertures below float32": (focused(SMOOTH, PLANE, method="factorized"), 1e-8, "float32 range profiles"),
     "range Doppler": (
         lambda t: sarcl.range_doppler(STRIP, tolerance=t, side="right", check=False), 1e-7, "rounding of complex64"
     ),
     "polar format": (lambda t: sarcl.polar_format(SMOOTH, PLANE, tolerance=t, check=False), 1e-9, "float32 grid"),
-    "field": (field, 1e-17, "path differences"),
+    "field": (field, 1e-11, "path differences"),
     "points": (echoed(POINTS), 1.5e-7, "float32 range profiles"),
     "points in a side lobe": (
         echoed(POINTS, track=aside(), antenna=sarcl.Antenna.gaussian(width=0.04)), 1.5e-6, "float32 gains",
@@ -105,12 +115,7 @@ REFUSED = {
 @pytest.mark.parametrize(
     "name", [pytest.param(n, marks=[pytest.mark.slow] if "too many" in n else []) for n in REFUSED]
 )
-def test_a_refusal_is_in_the_numbers_asked_for_and_its_best_works(name, monkeypatch):
-    monkeypatch.setattr(
-        "sarcl.scattering.facet_plan.MOST_FACETS", 20_000
-    )  # so that what is best takes a second, not an hour
-    monkeypatch.setattr("sarcl.base.validation.LEAST_TOLERANCE", 0.0)  # what float64 refuses lies below it
-    monkeypatch.setattr("sarcl.scattering.facet_plan.FLOAT64_TERMS", 0.0)  # as with more facets, pulses and samples
+def test_a_refusal_is_in_the_numbers_asked_for_and_its_best_works(name):
     make, asked, limit = REFUSED[name]
     with pytest.raises(ToleranceUnreachable) as caught:
         make(asked)
@@ -123,7 +128,7 @@ def test_a_refusal_is_in_the_numbers_asked_for_and_its_best_works(name, monkeypa
         refused.remedy in str(refused) or refused.remedy == f"pass tolerance={tolerance_text(refused.best)} or larger"
     )
     made = make(refused.best)
-    report = getattr(made, "report", None)
+    report = getattr(made, "report", getattr(made, "plan", None))  # of a field there is none
     assert report is None or report.predicted_error <= refused.best
 
 
@@ -182,18 +187,15 @@ def test_why_no_sub_apertures_are_tried_is_true():
         sarcl.backproject(raw, grid, tolerance=1e-2, method="direct")
 
 
-def test_a_remedy_is_named_only_where_it_works(monkeypatch):
-    monkeypatch.setattr("sarcl.base.validation.LEAST_TOLERANCE", 0.0)  # what float64 refuses lies below it
+def test_a_remedy_is_named_only_where_it_works():
     with pytest.raises(ToleranceUnreachable) as caught:
-        sarcl.backproject(SMOOTH, PLANE, tolerance=1e-20, method="factorized")
+        method_for(SMOOTH, PLANE, "factorized")(1e-20)
     assert caught.value.remedy == f"pass tolerance={tolerance_text(caught.value.best)} or larger"
-    make, asked, _ = REFUSED["facets uncut"]
     with pytest.raises(ToleranceUnreachable, match="let echo cut them") as caught:
-        make(asked)
-    echoed(PLATE)(asked)
-    monkeypatch.setattr("sarcl.scattering.facet_plan.MOST_FACETS", 20_000)
+        echoed(PLATE, {}, max_edge=None)(1e-3)
+    echoed(PLATE, {})(1e-3)
     with pytest.raises(ToleranceUnreachable) as caught:
-        make(1e-4)
+        echoed(PLATE, max_edge=None)(1e-4)
     assert "let echo cut them" not in str(caught.value)
 
 
@@ -260,11 +262,11 @@ PLANTED = {
     "float64": ("sarcl.imaging.float64.plan.make_plan", lambda: sarcl.backproject(RAW, PLANE, tolerance=1e-8)),
     "sub-apertures": (
         "sarcl.imaging.factorized.plan.make_plan",
-        lambda: sarcl.backproject(SMOOTH, PLANE, tolerance=1e-2),
+        lambda: sarcl.backproject(SMOOTH, LARGE, tolerance=1e-2),
     ),
     "sub-apertures, decimation": (
         "sarcl.imaging.factorized.plan.decimated",
-        lambda: sarcl.plan(SMOOTH, PLANE, tolerance=1e-2),
+        lambda: sarcl.plan(SMOOTH, LARGE, tolerance=1e-2),
     ),
     "lit parts": (
         "sarcl.visibility.lit_parts.candidate_pairs",
@@ -276,8 +278,6 @@ PLANTED = {
 @pytest.mark.parametrize("name", PLANTED)
 def test_a_bug_is_not_taken_for_a_refusal(name, monkeypatch):
     where, make = PLANTED[name]
-    # sub-apertures are looked for in small images too
-    monkeypatch.setattr("sarcl.numerics.cost_model.SEARCH_PAYS", 0.0)
     make()
     monkeypatch.setattr(where, broken)
     with pytest.raises(ValueError, match=BUG) as caught:

@@ -151,14 +151,14 @@ def test_large_images_are_reduced_by_averaging_power():
 @pytest.mark.parametrize("shape", [(5, 7), (3, 7), (10, 4), (8, 20), (1, 1)])
 def test_resampling_keeps_the_mean_power(shape):
     db = speckle((8, 10))
-    mean = decibels._average_power(db, 0.0, shape).mean()
+    mean = decibels.average_power(db, 0.0, shape).mean()
     assert mean == pytest.approx((10 ** (db / 10)).mean(), rel=1e-12)  # float64 sums
 
 
 def test_an_average_of_whole_blocks_is_the_mean_of_the_block():
     db = speckle((600, 9))
     blocks = (10 ** (db / 10)).reshape(300, 2, 3, 3).mean(axis=(1, 3))
-    np.testing.assert_allclose(decibels._average_power(db, 0.0, (300, 3)), blocks, rtol=1e-11)
+    np.testing.assert_allclose(decibels.average_power(db, 0.0, (300, 3)), blocks, rtol=1e-11)
 
 
 @pytest.mark.parametrize(("value", "level"), [(-np.inf, 0), (0.0, 255), (-300.0, 255), (7.5, 255)])

@@ -59,9 +59,16 @@ class Runs:
 
     @functools.cache  # noqa: B019 - lives as long as the test
     def __call__(self, pulse):
-        wave = PlaneWave(self.centre - self.tx[pulse], self.received[0, pulse], runs._pulse(BAND))
+        wave = PlaneWave(self.centre - self.tx[pulse], self.received[0, pulse], runs.incident_pulse(BAND))
         found = currents(
-            self.device, self.grid, self.target, wave, self.k, absorber=runs.ABSORBER, gap=runs.GAP, most_steps=8000
+            self.device,
+            self.grid,
+            self.target,
+            wave,
+            self.k,
+            absorber=runs.ABSORBER,
+            gap=runs.GAP,
+            options=runs.RunOptions(most_steps=8000),
         )
         return formed_echoes(self.device, found, self.tx, self.tx, self.received)
 

@@ -14,7 +14,6 @@ from sarcl.base import host_memory
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.base.report import root_sum_square
 from sarcl.fullwave import runs
-from sarcl.fullwave.echoes import _fullwave_task, _grid_choice
 from sarcl.opencl.choose_device import devices, open_device
 from sarcl.reference import mie
 from sarcl.scene.triangles import rotation
@@ -122,11 +121,16 @@ def test_bistatic_echoes_of_a_sphere_are_those_of_mie():
     assert difference(got[0], -along) < 0.04
 
 
+def lattice_of(scene):
+    """The grid about a scene, 12 cells per wavelength of 1.5 GHz."""
+    return sarcl.fullwave_echo.planned(scene, CHIRP, around(20, 30), cells=12, max_bytes=1e9).task.lattice
+
+
 @pytest.mark.parametrize("size", [(0.31, 0.43, 0.22), (0.2, 0.3, 0.1), (1.0, 0.05, 0.33)])
 def test_flat_sides_of_a_box_lie_on_nodes_or_little_outside(size):
     box = shapes.box(size, position=(3.0, -2.0, 7.0))
     cell = SPEED_OF_LIGHT / 1.5e9 / 12
-    lattice, _ = _grid_choice.grid_choice(box, (1e9, 1.5e9), 12, 1e9)
+    lattice = lattice_of(box)
     assert cell / runs.FINER <= lattice.cell <= cell
     low, high = (box.bounds - lattice.origin) / lattice.cell
     outside = np.ceil(low - 1e-6) - low, high - np.floor(high + 1e-6)
@@ -134,15 +138,15 @@ def test_flat_sides_of_a_box_lie_on_nodes_or_little_outside(size):
     assert (low >= runs.ABSORBER + runs.GAP).all() and (
         np.array(lattice.shape) - high >= runs.ABSORBER + runs.GAP
     ).all()
-    assert lattice.shape == tuple(runs.grid_shape(box.bounds, lattice.cell, _grid_choice.flat_sides(box)))
+    assert lattice.shape == tuple(runs.grid_shape(box.bounds, lattice.cell, np.ones((2, 3), bool)))
 
 
 def test_the_base_of_a_cone_lies_on_nodes_and_a_sphere_in_the_middle_of_its_grid():
-    cone, _ = _grid_choice.grid_choice(shapes.cone(0.2, 0.4), (1e9, 1.5e9), 12, 1e9)
+    cone = lattice_of(shapes.cone(0.2, 0.4))
     assert np.isclose(cone.origin[2] / cone.cell % 1, [0, 1], atol=1e-6).any()
-    below, _ = _grid_choice.grid_choice(shapes.cone(0.2, 0.4, rotation=(np.pi, 0, 0)), (1e9, 1.5e9), 12, 1e9)
+    below = lattice_of(shapes.cone(0.2, 0.4, rotation=(np.pi, 0, 0)))
     assert np.isclose(below.origin[2] / below.cell % 1, [0, 1], atol=1e-6).any()
-    ball, _ = _grid_choice.grid_choice(SPHERE, (1e9, 1.5e9), 12, 1e9)
+    ball = lattice_of(SPHERE)
     assert np.isclose(ball.cell, SPEED_OF_LIGHT / 1.5e9 / 12)
     assert np.allclose(runs.centre_of(ball), 0, atol=ball.cell * (1 + 1e-9) * np.array([1e-6, 1e-6, 0.5]))
 
@@ -301,15 +305,17 @@ def pretend(monkeypatch, stop_after=None, left=0.0):
     """Runs of the grid replaced by random echoes; the list of those that are done. The one after `stop_after` fails."""
     done = []
 
-    def run(device, lattice, target, band, k, *, anchor, twin, tx, received, **options):
+    def run(device, lattice, target, band, k, *, anchor, antennas, options):
         if len(done) == stop_after:
             raise RuntimeError("the machine is switched off")
-        done.append(anchor)
-        random = np.random.default_rng(int(1e6 * abs(np.concatenate(anchor).sum())))
-        made = (random.normal(size=(len(tx), len(received), len(k), 2)) @ [1, 1j]).astype(np.complex64)
-        return [made, 2 * made][: 1 + (twin is not None)], runs.RunEnd(100, left)
+        done.append((anchor.place, anchor.sent))
+        random = np.random.default_rng(int(1e6 * abs(np.concatenate(done[-1]).sum())))
+        made = (random.normal(size=(len(antennas.tx), len(antennas.received), len(k), 2)) @ [1, 1j]).astype(
+            np.complex64
+        )
+        return [made, 2 * made][: 1 + (anchor.twin is not None)], runs.RunEnd(100, left)
 
-    monkeypatch.setattr(_fullwave_task.runs, "run", run)
+    monkeypatch.setattr(runs, "run", run)
     return done
 
 
@@ -379,7 +385,7 @@ def test_progress_counts_steps_of_all_runs():
 
 
 def test_the_forecast_says_memory_steps_and_runs_before_the_work(monkeypatch):
-    monkeypatch.setattr(_fullwave_task.runs, "run", None)
+    monkeypatch.setattr(runs, "run", None)
     forecast = plan(BOX, CHIRP, around(20, 65), polarization="all", cells=8, out="nowhere/raw.h5")
     assert (forecast.method, forecast.n_rows, forecast.n_samples, forecast.plan["runs"]) == ("full wave", 8, 64, 4)
     assert forecast.plan["grid"] == "38 x 42 x 48" and 1e6 < forecast.plan["run_bytes"] < forecast.bytes < 2e7
@@ -406,7 +412,7 @@ def test_a_forecast_runs_its_own_plan_which_cuts_the_bodies_once(monkeypatch):
     box = shapes.box((0.1, 0.15, 0.1), material=sarcl.Material(eps_r=2 - 0.1j))
     whole = sarcl.fullwave_echo(box, CHIRP, track, **given)
     cuts, cut = [], runs.target_of
-    monkeypatch.setattr(_fullwave_task.runs, "target_of", lambda *args: (cuts.append(args), cut(*args))[1])
+    monkeypatch.setattr(runs, "target_of", lambda *args: (cuts.append(args), cut(*args))[1])
     forecast = plan(box, CHIRP, track, **given)
     assert len(cuts) == 2  # by the grid, and by larger cells
     for raw in (forecast.run(), forecast.run()):
@@ -559,7 +565,7 @@ def test_one_run_serves_two_anchors_of_a_body_that_is_its_own_mirror_image(monke
     track = around(*np.linspace(-40, 40, 7), height=20.0)
     options = {"cells": 8, "polarization": ("HH", "VH", "VV"), "model_error": False, "anchors": range(7)}
     both = sarcl.fullwave_echo(BOX, CHIRP, track, **options)
-    monkeypatch.setattr(_fullwave_task.runs, "mirror_twins", lambda *args: {})
+    monkeypatch.setattr(runs, "mirror_twins", lambda *args: {})
     alone = sarcl.fullwave_echo(BOX, CHIRP, track, **options)
     assert (both.report.plan["runs"], both.report.plan["mirrored"]) == (8, 6)
     assert (alone.report.plan["runs"], alone.report.plan["mirrored"]) == (14, 0)

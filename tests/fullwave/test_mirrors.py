@@ -120,8 +120,8 @@ def test_the_mirrored_run_gives_the_echoes_of_the_other_anchors_own_run(sent):
     assert twin.pulse == 3
     own, other = (
         currents(
-            device, grid, target, PlaneWave(centre - tx[p], received[sent, p], runs._pulse(BAND)), k,
-            absorber=runs.ABSORBER, gap=runs.GAP, most_steps=4000,
+            device, grid, target, PlaneWave(centre - tx[p], received[sent, p], runs.incident_pulse(BAND)), k,
+            absorber=runs.ABSORBER, gap=runs.GAP, options=runs.RunOptions(most_steps=4000),
         )
         for p in (3, 0)
     )  # fmt: skip

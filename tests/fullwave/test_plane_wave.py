@@ -8,7 +8,7 @@ from helpers.devices import opened, variants
 
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.fullwave import dispersion
-from sarcl.fullwave.currents import currents
+from sarcl.fullwave.currents import RunOptions, currents
 from sarcl.fullwave.fields import BLOCK, Fields
 from sarcl.fullwave.incident import PlaneWave, wave_table
 from sarcl.fullwave.lattice import COURANT, Lattice, lattice_around
@@ -92,7 +92,7 @@ def test_targets_outside_the_box_and_wavenumbers_outside_the_band_are_refused(pa
     def run(node, k):
         at = np.ravel_multi_index((0, *node), (3, *grid.shape))
         target = material_edges(grid, np.array([at]), np.array([2.0]), np.array([0.0]))
-        return currents(opened(param), grid, target, wave, k, absorber=8, gap=2, most_steps=0)
+        return currents(opened(param), grid, target, wave, k, absorber=8, gap=2, options=RunOptions(most_steps=0))
 
     assert run((16, 16, 16), k).n_steps == 0
     with pytest.raises(

@@ -16,7 +16,7 @@ from sarcl import shapes
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.fullwave.bodies.cut_cells import conductor
 from sarcl.fullwave.bodies.mesh_lines import mesh_lines
-from sarcl.fullwave.currents import Decay, box_of, currents, sample_period
+from sarcl.fullwave.currents import Decay, RunOptions, box_of, currents, sample_period
 from sarcl.fullwave.fields import BLOCK, SAMPLES, Fields
 from sarcl.fullwave.incident import PlaneWave, wave_table
 from sarcl.fullwave.lattice import Lattice
@@ -51,7 +51,9 @@ def wave_along(travel=(0.5, -0.3, -0.8)):
 
 def run(param, grid, target, **options):
     k = 2 * np.pi * FREQUENCIES * TOP / SPEED_OF_LIGHT
-    return currents(opened(param), grid, target, wave_along(), k, absorber=ABSORBER, gap=GAP, **options)
+    return currents(
+        opened(param), grid, target, wave_along(), k, absorber=ABSORBER, gap=GAP, options=RunOptions(**options)
+    )
 
 
 def echo(result):

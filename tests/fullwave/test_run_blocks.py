@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import os
 import signal
 import subprocess
@@ -10,17 +9,18 @@ import sys
 import threading
 import time
 from dataclasses import replace
-from types import SimpleNamespace
+from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.block_runs import Stopped, names, tiles
+from helpers.block_runs import Stopped, begin_earlier, names, tiles
 from helpers.devices import as_gpu
 
 import sarcl
 from sarcl import Material, shapes
 from sarcl.blocks import checkpoint
 from sarcl.cli import parser
+from sarcl.fullwave import runs
 from sarcl.opencl.choose_device import open_device
 from sarcl.opencl.device_list import devices
 from sarcl.opencl.failures import DeviceFailed
@@ -77,14 +77,14 @@ def same(one, two):
     return np.array_equal(one.samples[:], two.samples[:])
 
 
-def stop_after(runs):
+def stop_after(n_runs):
     """A progress function that ends the call once so many runs have begun to be reported as done."""
     seen = []
 
     def progress(stage, done, total):
         if stage == "full-wave runs" and done and done not in seen:
             seen.append(done)
-            if len(seen) > runs:
+            if len(seen) > n_runs:
                 raise Stopped
 
     return progress
@@ -131,7 +131,7 @@ def test_the_error_of_the_grid_is_compared_at_the_pulse_of_the_anchor_too():
 
 
 def test_a_call_that_was_stopped_goes_on(whole, tmp_path, monkeypatch):
-    monkeypatch.setattr(checkpoint, "PERIOD", 0.0)
+    begin_earlier(2.0, monkeypatch.setattr)
     with pytest.raises(Stopped):
         of("mirrored", out=tmp_path / "a.h5", resume=True, progress=stop_after(12))
     n = len(tiles(tmp_path, "anchors"))
@@ -142,11 +142,11 @@ def test_a_call_that_was_stopped_goes_on(whole, tmp_path, monkeypatch):
 
 
 def test_what_ends_a_short_call_leaves_nothing_and_a_long_one_keeps_its_runs(tmp_path, monkeypatch):
-    monkeypatch.setattr(checkpoint, "PERIOD", 0.0)
+    begin_earlier(2.0, monkeypatch.setattr)
     with pytest.raises(Stopped):
         of("mirrored", out=tmp_path / "a.h5", progress=stop_after(12))
     assert names(tmp_path) == []
-    monkeypatch.setattr(checkpoint, "time", SimpleNamespace(monotonic=itertools.count(0, 100.0).__next__))
+    begin_earlier(100.0, monkeypatch.setattr)
     with pytest.raises(Stopped):
         of("mirrored", out=tmp_path / "a.h5", progress=stop_after(12))
     assert tiles(tmp_path, "anchors")
@@ -163,7 +163,7 @@ def test_damaged_files_of_runs_are_computed_again(whole, tmp_path, caplog):
 
 
 def test_a_full_disk_for_runs_is_a_warning_and_the_echoes_are_made(whole, tmp_path, monkeypatch, caplog):
-    monkeypatch.setattr(checkpoint, "PERIOD", 0.0)
+    begin_earlier(2.0, monkeypatch.setattr)
 
     def full(*_):
         raise OSError(28, "No space left on device")
@@ -197,11 +197,13 @@ def test_runs_of_other_echoes_are_refused_with_what_differs(tmp_path, name):
     assert same(echo(**given | options, resume=False), echo(**given | options | {"out": None}))
 
 
+TESTS = str(Path(__file__).parents[1])
 KILLED = """
 import sys
+sys.path.append(sys.argv[2])
 import numpy as np, sarcl
-from sarcl.blocks import checkpoint
-checkpoint.PERIOD = 0.0
+from helpers.block_runs import begin_earlier
+begin_earlier(2.0)
 box, chirp = sarcl.shapes.box((0.2, 0.3, 0.1)), sarcl.Waveform.chirp(center=1.25e9, bandwidth=500e6, duration=2e-8)
 angle = np.deg2rad(np.linspace(20, 75, 12))
 track = sarcl.Trajectory(None, np.stack([40 * np.cos(angle), 40 * np.sin(angle), 0 * angle], 1))
@@ -216,7 +218,7 @@ def test_killed_calls_lose_the_run_in_progress_alone_and_end_with_the_same_bits(
     path, hit = tmp_path / "killed" / "a.h5", 0
     for number in range(4):
         before = len(tiles(path.parent, "anchors"))
-        process = subprocess.Popen([sys.executable, "-c", KILLED, str(path)])
+        process = subprocess.Popen([sys.executable, "-c", KILLED, str(path), TESTS])
         while process.poll() is None and len(tiles(path.parent, "anchors")) < before + 1 + number % 2:
             time.sleep(0.001)
         time.sleep(0.02 * number)
@@ -224,7 +226,7 @@ def test_killed_calls_lose_the_run_in_progress_alone_and_end_with_the_same_bits(
         hit += process.wait() == -signal.SIGKILL
         assert len(tiles(path.parent, "anchors")) > before or path.exists()
     for name in ("killed/a.h5", "b.h5"):
-        subprocess.run([sys.executable, "-c", KILLED, str(tmp_path / name)], check=True)
+        subprocess.run([sys.executable, "-c", KILLED, str(tmp_path / name), TESTS], check=True)
     assert hit >= 3 and names(tmp_path) == ["b.h5", "killed"] and names(tmp_path / "killed") == ["a.h5"]
     assert same(sarcl.read(path), sarcl.read(tmp_path / "b.h5"))
 
@@ -239,9 +241,7 @@ def test_two_devices_of_a_kind_make_the_bits_of_one(case, pair, whole):
 
 
 def test_both_devices_compute_runs_and_one_that_is_lost_is_left_out(pair, whole, monkeypatch, caplog):
-    from sarcl.fullwave.echoes import _fullwave_task
-
-    run, users, lost, begun = _fullwave_task.runs.run, set(), set(), threading.Barrier(2, timeout=60)
+    run, users, lost, begun = runs.run, set(), set(), threading.Barrier(2, timeout=60)
 
     def counted(device, *args, **options):
         if device in lost:
@@ -251,7 +251,7 @@ def test_both_devices_compute_runs_and_one_that_is_lost_is_left_out(pair, whole,
             begun.wait()
         return run(device, *args, **options)
 
-    monkeypatch.setattr(_fullwave_task.runs, "run", counted)
+    monkeypatch.setattr(runs, "run", counted)
     assert same(of("all", device=pair), whole("all")) and users == set(pair)
     lost.add(pair[1])
     assert same(of("all", device=pair), whole("all")) and "the other devices go on without it" in caplog.text

@@ -40,12 +40,17 @@ def started(param, grid, target, **options):
     return fields, e, h
 
 
+def after(values, axis, beyond):
+    """values[i + 1] along an axis; `beyond` after the last."""
+    return np.insert(np.delete(values, 0, axis), values.shape[axis] - 1, beyond, axis)
+
+
 def areas_of(target, length):
     """Free areas of all faces (3, *shape), from the free lengths of edges (3, *shape) and the weights of cut faces."""
     area = np.empty(length.shape)
     for a in range(3):
         b, c = (a + 1) % 3, (a + 2) % 3
-        around = [length[c], cut_cells._next(length[c], b, 1), length[b], cut_cells._next(length[b], c, 1)]
+        around = [length[c], after(length[c], b, 1), length[b], after(length[b], c, 1)]
         area[a] = np.max(around, axis=0) > 0
         listed = target.faces // area[a].size == a
         at = target.faces[listed] % area[a].size
@@ -202,7 +207,7 @@ def test_the_free_area_of_a_face_is_that_of_its_polygon():
         free = [outside(*value[at]) for at in (1, 0)] + [outside(*value[:, at]) for at in (1, 0)]
         fine = (np.arange(400) + 0.5) / 400
         wanted = (np.add.outer(normal[0] * fine, normal[1] * fine) - offset * normal.sum() >= 0).mean()
-        got = cut_cells._free_area((value < 0).T.reshape(4, 1), np.array(free)[:, None])
+        got = cut_cells.free_area((value < 0).T.reshape(4, 1), np.array(free)[:, None])
         assert abs(got[0] - wanted) < 0.005
         seen.add(int((value < 0).sum()))
     assert seen == {0, 1, 2, 3, 4}
@@ -234,7 +239,7 @@ def test_no_mode_beside_cut_bodies_is_faster_than_the_time_steps_allow():
         length = np.stack([cut_cells.free_lengths(whole, a, part) for a, part in enumerate(intervals)])
         inside = cut_cells.nodes_inside(whole, intervals[0])
         for a in range(3):
-            length[a][inside & cut_cells._next(inside, a, False)] = 0
+            length[a][inside & after(inside, a, False)] = 0
         area = areas_of(conductor(grid, intervals, areas), length)
         reached.append(fastest(length, area))
         least.append(area[area > 0].min())

@@ -167,9 +167,9 @@ def on_paper(device: PaperDevice) -> Iterator[None]:
         mock.patch.object(choose_device, "listed", lambda: ((device.info, None),)),
         mock.patch.object(choose_device, "tried", lambda index: device.info),
         mock.patch.object(choose_device, "devices", lambda: (device.info,)),
-        mock.patch.object(choose_device, "_open", lambda index: device),
+        mock.patch.object(choose_device, "open_listed", lambda index: device),
         mock.patch.object(lit_parts, "with_float64", lambda chosen: chosen),  # another device's work on a real machine
-        mock.patch.object(fft, "_reikna", lambda device, data, inverse: data),
+        mock.patch.object(fft, "reikna_rows", lambda device, data, inverse: data),
         mock.patch.object(fft, "in_place", lambda device, buffer, shape, dtype: None),
         mock.patch.dict(os.environ),
         warnings.catch_warnings(),

@@ -234,13 +234,13 @@ def main() -> int:
     Device.zeros = _zeros  # type: ignore[method-assign]
     for make in ("upload", "empty"):
         setattr(Device, make, _keeping(getattr(Device, make)))
-    fft._reikna, fft.in_place = _reikna, _in_place
+    fft.reikna_rows, fft.in_place = _reikna, _in_place
     whole = programs.source
     device_module.source = lambda file: whole(file).replace("restrict", "")  # type: ignore[assignment]
     device = open_device()
     assert "Oclgrind" in device.info.name, f"this is {device.info.name}, not Oclgrind"
     used = chosen(device, sys.argv[1])
-    choose_device._open = lambda index: used  # type: ignore[assignment]
+    choose_device.open_listed = lambda index: used  # type: ignore[assignment]
     error, allowed = TASKS[sys.argv[1].removesuffix(NO_FP64)]()
     print(f"error {error:.1e}, allowed {allowed:.1e}")
     return int(not error <= allowed)

@@ -80,9 +80,11 @@ def image_error(image, raw, *, most=None, among=None, exact=exact_image, **model
 
 
 def planned_within(limits, verb, *subjects, **options):
-    """The plan of a verb of echoes for these arguments, with other values of fields of EchoLimits."""
+    """The plan of a verb of echoes for these arguments, with other values of fields of EchoLimits; "host" as one of
+    them: bytes for facets that are cut."""
     plan = verb.planned(*subjects, **options)
-    request = plan.task.request
+    request, limits = plan.task.request, dict(limits)
+    request = replace(request, host=limits.pop("host", request.host))
     request = replace(request, limits=replace(request.limits, **limits))
     return replace(plan, task=replace(plan.task, request=request))
 

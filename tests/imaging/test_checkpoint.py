@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import errno
 import io
-import itertools
 import json
 import logging
 import os
@@ -16,15 +15,14 @@ import sys
 import time
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from helpers.block_runs import Stopped, names, tiles
+from helpers.block_runs import Stopped, begin_earlier, names, tiles
 from helpers.cases import noise_history
 
 import sarcl
-from sarcl.blocks import checkpoint, tile_files
+from sarcl.blocks import tile_files
 from sarcl.blocks.bands import BandBuffer
 from sarcl.blocks.tile_files import mark
 from sarcl.cli import parser
@@ -206,18 +204,13 @@ def test_a_short_run_that_fails_leaves_nothing_unless_asked(raw, tmp_path):
     assert names(tmp_path) == []
 
 
-def pass_between_looks(monkeypatch, seconds):
-    """So many seconds pass each time a checkpoint looks at the clock."""
-    monkeypatch.setattr(checkpoint, "time", SimpleNamespace(monotonic=itertools.count(0, seconds).__next__))
-
-
 def test_an_interrupted_run_keeps_what_is_worth_it(raw, whole, tmp_path, monkeypatch, caplog):
-    pass_between_looks(monkeypatch, 2.0)
+    begin_earlier(2.0, monkeypatch.setattr)
     options = {"out": tmp_path / "image.h5", "max_bytes": SMALL, "progress": stop_after(raw.n_rows * GRID.size / 2)}
     with pytest.raises(Stopped):
         sarcl.backproject(raw, GRID, **options)
     assert names(tmp_path) == []  # less than a minute of work
-    pass_between_looks(monkeypatch, 100.0)
+    begin_earlier(100.0, monkeypatch.setattr)
     with pytest.raises(Stopped):
         sarcl.backproject(raw, GRID, **options)
     assert len(tiles(tmp_path)) >= 3 and "the same call continues" in caplog.text
@@ -248,7 +241,7 @@ def test_a_full_disk_costs_the_files_but_not_the_image(raw, whole, tmp_path, mon
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(tile_files.TileStore, "save", full)
-    pass_between_looks(monkeypatch, 2.0)
+    begin_earlier(2.0, monkeypatch.setattr)
     image = sarcl.backproject(raw, GRID, out=tmp_path / "image.h5", max_bytes=SMALL)
     assert np.array_equal(image.data[...], whole.data)
     assert caplog.text.count("finished tiles cannot be kept") == 1 and "No space left" in caplog.text
@@ -311,8 +304,8 @@ sys.path.insert(0, {tests!r})
 import os, signal, random
 from helpers.cases import noise_history
 import sarcl
-from sarcl.blocks import checkpoint
-checkpoint.PERIOD = 0.0
+from helpers.block_runs import begin_earlier
+begin_earlier(2.0)
 left = {calls}
 def deadly(call):
     def wrapped(*args, **options):

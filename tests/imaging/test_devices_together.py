@@ -228,8 +228,8 @@ def test_cpus_add_up_to_the_fastest_of_them_and_others_to_all(pair, monkeypatch)
 
     speeds = {device("cpu"): 1.0, device("cpu"): 3.0, device("gpu"): 10.0, device("gpu"): 20.0}
     monkeypatch.setattr(forecast, "speed", speeds.__getitem__)
-    assert forecast._rate(list(speeds)) == 33.0
-    assert forecast._rate([d for d in speeds if d.is_cpu]) == 3.0
+    assert forecast.rate_of(list(speeds)) == 33.0
+    assert forecast.rate_of([d for d in speeds if d.is_cpu]) == 3.0
 
 
 def test_bad_lists_of_devices_say_what_is_wrong(raw):

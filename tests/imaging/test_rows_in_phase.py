@@ -157,7 +157,7 @@ def test_what_can_be_met_at_best_is_not_sought_where_a_tolerance_is_met(monkeypa
     monkeypatch.setattr(profile_energy.ProfileEnergy, "largest", lambda self, n: asked.append(n) or 1.0)
     choose_method.choose(task, "direct", 1e-2)
     assert not asked
-    assert choose_method._Float32(task, 1e-2)._best() < 1e-2 and asked
+    assert choose_method.Float32Methods(task, 1e-2).best() < 1e-2 and asked
 
 
 def test_a_plan_is_made_again_where_profiles_of_its_length_have_larger_errors(monkeypatch):

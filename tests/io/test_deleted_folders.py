@@ -88,6 +88,6 @@ def test_a_limit_on_files_that_would_end_pocl_is_told_before_it_builds(monkeypat
     resource = pytest.importorskip("resource")
     monkeypatch.setattr(resource, "getrlimit", lambda which: (51200, resource.RLIM_INFINITY))
     with pytest.raises(OSError, match=r"kernels cannot be built: files may have 51\.2 kB .*\(ulimit -f\).*raise the"):
-        programs._check_file_limit()
+        programs.check_file_limit()
     monkeypatch.setattr(resource, "getrlimit", lambda which: (resource.RLIM_INFINITY,) * 2)
-    programs._check_file_limit()
+    programs.check_file_limit()

@@ -14,7 +14,7 @@ from scipy.io import savemat
 
 import sarcl
 from sarcl.cli.parser import main
-from sarcl.io import formats, hdf5, output_paths, sarcl_hdf5
+from sarcl.io import formats, output_paths, sarcl_hdf5
 from sarcl.model import store
 from sarcl.model.phase_history import PER_ROW
 
@@ -74,6 +74,17 @@ def all_optional(n=7):
     }
 
 
+def plain(value):
+    """A value of a report as files keep it: plain numbers and lists in place of NumPy's, texts in place of the rest."""
+    if isinstance(value, dict):
+        return {str(key): plain(v) for key, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return type(value)(map(plain, value))
+    if isinstance(value, (np.generic, np.ndarray)):
+        return plain(value.tolist())
+    return value if value is None or isinstance(value, (bool, int, float)) else str(value)
+
+
 def same(a, b):
     """Equal to the bit, NaN included; nouns field by field."""
     if a is None or b is None:
@@ -82,7 +93,7 @@ def same(a, b):
         a, b = np.asarray(a), np.asarray(b)
         return a.dtype == b.dtype and a.shape == b.shape and a.tobytes() == b.tobytes()
     if isinstance(a, sarcl.Report):
-        return repr(hdf5._plain(a.to_dict())) == repr(hdf5._plain(b.to_dict()))
+        return repr(plain(a.to_dict())) == repr(plain(b.to_dict()))
     if hasattr(a, "__dataclass_fields__"):
         return all(same(getattr(a, f.name), getattr(b, f.name)) for f in fields(a))
     return type(a) is type(b) and repr(a) == repr(b)

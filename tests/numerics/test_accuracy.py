@@ -70,7 +70,7 @@ def test_the_lower_bound_of_fitted_kernels_is_below_their_error(taps):
 def test_kernels_of_gpus_are_the_cheapest_of_both_families():
     for error in (1e-7, 1e-5, 1e-4, 1e-3):
         made, length, cost = interpolator_choice.choose_interpolator(error, 1000, 1e6, 0.0, cost_model.ON_GPU)
-        every = [(t, s, n) for t, s, n in interpolator_choice._candidates(1000, 0.0) if fitted(t, s).error <= error]
+        every = [(t, s, n) for t, s, n in interpolator_choice.interpolators(1000, 0.0) if fitted(t, s).error <= error]
         costs = [1e6 * cost_model.ON_GPU.of_taps(t, s) + cost_model.profile(n) for t, s, n in every]
         assert made.error <= error and cost * 1e6 == pytest.approx(min(costs))
         assert (made.taps, made.oversample, length) in every and made.terms == max(made.taps // 2, 1)
@@ -87,7 +87,7 @@ def test_wavefronts_of_long_profiles_cost_more_than_taps():
 
 @pytest.mark.parametrize("n_samples, carrier", [(1, 0.0), (100, 0.0), (3000, 1024.0), (2**19, 0.0)])
 def test_the_choice_is_the_cheapest_of_all_interpolators(n_samples, carrier):
-    every = [(interpolator(t, s), length) for t, s, length in interpolator_choice._candidates(n_samples, carrier)]
+    every = [(interpolator(t, s), length) for t, s, length in interpolator_choice.interpolators(n_samples, carrier)]
     least = min(made.error for made, _ in every)
     assert interpolator_choice.least_error(n_samples, carrier) == least
     for error in (least, 1e-6, 1e-4, 1e-2, 0.4):

@@ -143,7 +143,7 @@ def fake(monkeypatch, *devices, rates=None):
     monkeypatch.setattr(device_list, "trial", lambda handle, *offered: Outcome(rate=rates[handle.index]))
     monkeypatch.setattr(device_list._trial_record, "find", lambda key: None)
     monkeypatch.setattr(device_list._trial_record, "keep", lambda key, found: None)
-    monkeypatch.setattr(choose_device, "_open", lambda index: index)
+    monkeypatch.setattr(choose_device, "open_listed", lambda index: index)
     monkeypatch.delenv("SARCL_DEVICE", raising=False)
     device_list.tried.cache_clear()
 

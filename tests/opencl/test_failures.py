@@ -140,4 +140,4 @@ def test_threads_that_open_a_device_get_the_same_one(monkeypatch):
     for thread in threads:
         thread.join()
     assert len(set(map(id, made))) == 1
-    assert choose_device._open.__wrapped__ is not None
+    assert choose_device.open_listed.__wrapped__ is not None

@@ -23,14 +23,14 @@ def noise(rows, length):
 @pytest.fixture
 def planned(monkeypatch):
     """Shapes of the batches, in their order."""
-    shapes, plan = [], fft._plan
+    shapes, plan = [], fft.compiled_plan
 
     def seen(device, shape, kind):
         shapes.append(shape)
         return plan(device, shape, kind)
 
     seen.cache_clear = plan.cache_clear
-    monkeypatch.setattr(fft, "_plan", seen)
+    monkeypatch.setattr(fft, "compiled_plan", seen)
     return shapes
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from helpers.cases import thinned
+from helpers.cases import planned_within, thinned
 
 import sarcl
 from sarcl import pointing
@@ -30,9 +30,9 @@ def track(n=96, length=300.0):
     return sarcl.Trajectory.line(start=(-7e3, -length / 2, 7e3), velocity=(0, length, 0), prf=float(n), n_pulses=n)
 
 
-@pytest.fixture
-def always(monkeypatch):
-    monkeypatch.setattr(pulse_nodes, "WORTH", 0)
+def echo(*subjects, own=0.0, **options):
+    """Echoes of few facets that share amplitudes; `own` as in EchoLimits.own_amplitudes."""
+    return planned_within({"own_amplitudes": own}, sarcl.echo, *subjects, **options).run()
 
 
 @pytest.mark.parametrize(("n", "spacing"), [(17, 4), (18, 4), (65, 16), (100, 8), (257, 64)])
@@ -57,18 +57,18 @@ def test_each_its_own():
 
 
 @pytest.mark.parametrize("material, tolerance", thinned([ROUGH, BOTH, "metal"], [1e-2, 1e-3]))
-def test_shared_amplitudes_keep_the_tolerance(device, always, material, tolerance):
+def test_shared_amplitudes_keep_the_tolerance(device, material, tolerance):
     """Against the exact sum of every pulse's own amplitudes, in HH and HV, gains and shadows among them."""
     scene = hills(4, material, edge=0.2)
     tx = pointing.spotlight(track(), (0, 0, 0))
     options = {"polarization": ["HH", "HV"], "antenna": Antenna.gaussian(width=0.002), "device": device}
-    raw = sarcl.echo(scene, CHIRP, tx, tolerance=tolerance, check=True, **options)
+    raw = echo(scene, CHIRP, tx, tolerance=tolerance, check=True, **options)
     assert raw.report.plan["pulses per amplitude"] >= 4
     assert raw.report.measured_error <= raw.report.predicted_error <= tolerance
 
 
 @pytest.mark.costly
-def test_shared_or_not_the_same_echoes_and_counts(device, monkeypatch):
+def test_shared_or_not_the_same_echoes_and_counts(device):
     """A receiver of its own, a window that cuts, facets that turn away on the way, blocks that end anywhere."""
     scene = hills(8, BOTH, edge=0.4) + sarcl.Scene.facets(
         [[[-2.0, 0, 0], [2, 0, 0], [0, 0.02, 3]], [[0, 2, 0.0], [1, 2, 0], [1, 2.0, 2]]], material=ROUGH
@@ -77,9 +77,8 @@ def test_shared_or_not_the_same_echoes_and_counts(device, monkeypatch):
     rx = sarcl.Trajectory(tx.times, tx.positions + np.array([200.0, 300, -500]))
     made = []
     for worth in (0, 1e12):
-        monkeypatch.setattr(pulse_nodes, "WORTH", worth)
         options = {"receiver": rx, "range_window": (-3, 20), "tolerance": 1e-3, "max_edge": 0.2, "device": device}
-        made.append(sarcl.echo(scene, CHIRP, tx, polarization="all", **options))
+        made.append(echo(scene, CHIRP, tx, own=worth, polarization="all", **options))
     shared, own = made
     assert shared.report.plan["pulses per amplitude"] > 1 == own.report.plan["pulses per amplitude"]
     assert np.linalg.norm(shared.samples - own.samples) <= 1e-3 * np.linalg.norm(own.samples)
@@ -88,25 +87,24 @@ def test_shared_or_not_the_same_echoes_and_counts(device, monkeypatch):
     assert sums[0] == sums[1]
 
 
-def test_a_jumping_track_shares_nothing(device, always):
+def test_a_jumping_track_shares_nothing(device):
     """Neighbours in time that are far apart in space: every pulse has its own amplitudes, and the echo is right."""
     tx = track()
     order = np.random.default_rng(2).permutation(len(tx))
     jumping = sarcl.Trajectory(tx.times, tx.positions[order])
-    raw = sarcl.echo(hills(8), CHIRP, jumping, tolerance=1e-2, check=True, device=device)
+    raw = echo(hills(8), CHIRP, jumping, tolerance=1e-2, check=True, device=device)
     assert raw.report.plan["pulses per amplitude"] == 1
     assert raw.report.measured_error <= raw.report.predicted_error <= 1e-2
 
 
-def test_no_flash_falls_between_nodes(device, always):
+def test_no_flash_falls_between_nodes(device):
     """A plate that mirrors for three pulses of two hundred: nodes are denser than its flash, whatever samples say."""
     plate = sarcl.Scene.facets([[[-1.0, -1, 0], [1, -1, 0], [1, 1, 0]], [[-1.0, -1, 0], [1, 1, 0], [-1, 1, 0]]])
     tx = sarcl.Trajectory.line(start=(-900, 0, 6e5), velocity=(1800e2, 0, 0), prf=100 * 200.0, n_pulses=200)
     tx = sarcl.Trajectory(tx.times, tx.positions * (60, 1, 1))
-    raw = sarcl.echo(plate, CHIRP, tx, tolerance=1e-2, check=True, device=device)
+    raw = echo(plate, CHIRP, tx, tolerance=1e-2, check=True, device=device)
     own = raw.report.plan["pulses per amplitude"]
     assert own == 1 or 2 * np.pi / 0.031 * 2 * own * 9e-4 * raw.report.plan["facet edges, m"] * 2 / 3 <= 1.01
-    pulse_nodes.WORTH = 1e12
     wanted = sarcl.echo(plate, CHIRP, tx, tolerance=1e-2, device=device)
     assert np.linalg.norm(raw.samples - wanted.samples) <= 1e-2 * np.linalg.norm(wanted.samples)
 
@@ -123,7 +121,7 @@ def test_memory_for_amplitudes_keeps_to_the_budget(device):
 
 
 @pytest.mark.parametrize("tolerance", [2e-3, 2e-2])
-def test_the_error_between_nodes_knows_how_h_and_v_turn_below_the_antenna(always, tolerance):
+def test_the_error_between_nodes_knows_how_h_and_v_turn_below_the_antenna(tolerance):
     """4000 facets under a track, seen by a receiver 40 deg off the vertical: 16 pulses apart, thrice the estimate."""
     random, n, names, up = np.random.default_rng(2), 4000, ("HH", "VV"), np.array([0.0, 0.0, 1.0])
     places = random.uniform((-100, -100, 0), (100, 100, 5), (n, 3))
@@ -133,7 +131,7 @@ def test_the_error_between_nodes_knows_how_h_and_v_turn_below_the_antenna(always
     )  # fmt: skip
     tx = np.stack([np.linspace(-50, 50, 1001), np.zeros(1001), np.full(1001, 1e3)], axis=1)
     geometry = PulseGeometry(tx, np.broadcast_to([700.0, 300.0, 900.0], (1001, 3)))
-    nodes = pulse_nodes.plan_pulse_nodes(part, AntennaWeights(geometry, 9.6e9), names, up, 9.6e9, tolerance)
+    nodes = pulse_nodes.plan_pulse_nodes(part, AntennaWeights(geometry, 9.6e9), names, up, 9.6e9, tolerance, 0)
     assert (nodes.spacing > 1) == (tolerance > 1e-2)
 
     def sent(pulse):

@@ -11,11 +11,10 @@ from scipy.spatial.transform import Rotation
 
 import sarcl
 from sarcl.reference import facet_pieces
-from sarcl.scattering import facet_shadows, rough_pieces
+from sarcl.scattering import rough_pieces
 from sarcl.scattering.random_surface import ROUND, cell_edge, pieces_of
 from sarcl.scattering.rough_pieces import RoughFacets, RoughPieces
 from sarcl.scene import triangles as geometry
-from sarcl.simulation import echo_request, scene_preparation
 
 SLIGHTLY = sarcl.Material(diagram="cos", height=4e-3)
 COS, SHARP = sarcl.Material(diagram="cos"), sarcl.Material(eps_r=4.0, conductivity=1e-3, diagram="exp", width=0.5)
@@ -44,8 +43,8 @@ def terrain(n=12, **options):
     return sarcl.Scene.from_heights(axis, axis, np.sin(x / 3) * np.cos(y / 4), **{"material": COS, **options})
 
 
-def cut(device, one, cell, seed):
-    return RoughPieces.cut(device, one, cell, seed, RoughPieces.suited(device, one))
+def cut(device, one, cell, seed, *most):
+    return RoughPieces.cut(device, one, cell, seed, RoughPieces.suited(device, one), *most)
 
 
 def track(n=8):
@@ -96,12 +95,11 @@ def test_a_facet_of_a_million_pieces_is_cut_in_parts(double):
 
 
 @pytest.mark.parametrize("width", [1e4, 1e-6])
-def test_too_many_pieces_are_refused_with_the_words_of_the_host(double, monkeypatch, width):
-    monkeypatch.setattr(rough_pieces, "MOST_FACETS", 5000)
+def test_too_many_pieces_are_refused_with_the_words_of_the_host(double, width):
     long = scene(np.array([[[0.0, 0, 0], [1e4, 0, 0], [0, width, 0]]]))
     on_host = lambda: geometry.cut(long.triangles, ROUND * 0.1, 5000)  # noqa: E731
     texts = []
-    for work in (lambda: cut(double, long, 0.1, 0), on_host):
+    for work in (lambda: cut(double, long, 0.1, 0, 5000), on_host):
         with pytest.raises(MemoryError) as refused:
             work()
         texts.append(str(refused.value))
@@ -187,12 +185,11 @@ def test_echoes_are_those_of_pieces_cut_on_the_host(double, monkeypatch, name):
 
 
 @pytest.mark.parametrize("is_picked", [False, True])
-def test_blocks_hold_each_piece_once(double, monkeypatch, is_picked):
-    monkeypatch.setattr(rough_pieces, "BLOCK", 300)
+def test_blocks_hold_each_piece_once(double, is_picked):
     pieces = cut(double, scene(TRIANGLES["many"]), 0.2, 0)
     some = np.flatnonzero(np.arange(len(pieces)) % 3 > 0) if is_picked else np.arange(len(pieces))
     pieces = pieces.picked(some)
-    blocks = list(pieces.blocks())
+    blocks = list(replace(pieces, block=300).blocks())
     assert len(blocks) > 3
     assert np.array_equal(np.concatenate([np.arange(len(pieces))[here] for here, _ in blocks]), np.arange(len(pieces)))
     whole, row = pieces.corners()
@@ -205,12 +202,14 @@ def test_blocks_hold_each_piece_once(double, monkeypatch, is_picked):
 def test_pieces_made_anew_for_each_block_of_pulses_give_the_same_bits(double, monkeypatch, name):
     one, shadows = SCENES[name][0](), SCENES[name][1]
     ask = {"tolerance": 2e-2, "seed": 3, "device": double, "shadows": shadows}
-    plan = planned_within({"few_looks": 0}, sarcl.echo, one, CHIRP, track(), **ask)
-    whole = plan.run().samples
-    monkeypatch.setattr(rough_pieces, "BLOCK", 500)
+    plan, anew = (
+        planned_within({"few_looks": 0} | more, sarcl.echo, one, CHIRP, track(), **ask)
+        for more in ({}, {"kept_pieces": 0.0})
+    )
+    whole, whole_cut = plan.run().samples, RoughPieces.cut
+    monkeypatch.setattr(RoughPieces, "cut", lambda *given: replace(whole_cut(*given), block=500))
     stay = plan.run().samples
-    monkeypatch.setattr(scene_preparation, "KEPT_PIECES", 0)
-    assert np.array_equal(plan.run().samples, stay)
+    assert np.array_equal(anew.run().samples, stay)
     assert np.linalg.norm(stay - whole) <= ask["tolerance"] / 4 * np.linalg.norm(whole)  # each block has its plan
 
 
@@ -223,11 +222,9 @@ def test_pieces_on_a_device_are_not_limited_by_the_memory_for_facets(double):
         sarcl.plan(sarcl.echo, one, wide, track(1), max_bytes=1e6, **{**ask, "device": double.without_fp64()})
 
 
-def test_more_pieces_in_shadow_than_the_host_holds_are_refused(double, monkeypatch):
-    monkeypatch.setattr(echo_request, "LEAST_HOST", 1e6)
-    plan = planned_within({"few_looks": 0}, sarcl.echo, SCENES["a box on terrain"][0](), CHIRP, track(), tolerance=2e-2,
-                          device=double, max_bytes=1e6)  # fmt: skip
-    monkeypatch.setattr(facet_shadows, "FACET_BYTES", 1e5)
+def test_more_pieces_in_shadow_than_the_host_holds_are_refused(double):
+    plan = planned_within({"few_looks": 0, "host": 1e4}, sarcl.echo, SCENES["a box on terrain"][0](), CHIRP, track(),
+                          tolerance=2e-2, device=double)  # fmt: skip
     with pytest.raises(MemoryError, match="shadows may fall on"):
         plan.run()
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import os
 import random
 import signal
@@ -11,11 +10,10 @@ import sys
 import threading
 import time
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from helpers.block_runs import Stopped, names, tiles
+from helpers.block_runs import Stopped, begin_earlier, names, observe, observe_devices, tiles
 from helpers.devices import as_gpu
 
 import sarcl
@@ -26,7 +24,6 @@ from sarcl.io import output_paths
 from sarcl.opencl.choose_device import open_device
 from sarcl.opencl.device_list import devices
 from sarcl.opencl.failures import DeviceFailed
-from sarcl.simulation._echo_blocks import EchoEngine
 
 CHIRP = sarcl.Waveform.chirp(center=9.6e9, bandwidth=200e6, duration=5e-8)
 TRACK = sarcl.Trajectory.circle(radius=5e3, height=3e3, arc=0.02, n_pulses=200)
@@ -182,7 +179,7 @@ def test_a_progress_function_that_raises_leaves_nothing_of_a_short_run(tmp_path)
 
 
 def test_a_long_run_keeps_its_tiles_when_it_fails(whole_wide, tmp_path, monkeypatch):
-    monkeypatch.setattr(checkpoint, "time", SimpleNamespace(monotonic=itertools.count(0, 100.0).__next__))
+    begin_earlier(100.0, monkeypatch.setattr)
     with pytest.raises(Stopped):
         echo(out=tmp_path / "a.h5", progress=stop_after(0.6), **WIDE)
     assert tiles(tmp_path)
@@ -190,7 +187,7 @@ def test_a_long_run_keeps_its_tiles_when_it_fails(whole_wide, tmp_path, monkeypa
 
 
 def test_a_full_disk_for_tiles_is_a_warning_and_the_echoes_are_made(whole, tmp_path, monkeypatch, caplog):
-    monkeypatch.setattr(checkpoint, "PERIOD", 0.0)
+    begin_earlier(2.0, monkeypatch.setattr)
 
     def full(*_):
         raise OSError(28, "No space left on device")
@@ -226,13 +223,15 @@ def test_tiles_of_other_echoes_are_refused_with_what_differs(tmp_path, name):
     assert same(fresh, echo(**options)) and names(tmp_path) == ["a.h5"]
 
 
+TESTS = str(Path(__file__).parents[1])
 SCRIPT = """
 import sys
+sys.path.append(sys.argv[2])
 import numpy as np
 import sarcl
-from sarcl.blocks import checkpoint
-from sarcl.simulation import _echo_blocks
-checkpoint.PERIOD = _echo_blocks.LEAST_BYTES = 0.0
+from helpers.block_runs import begin_earlier, observe
+begin_earlier(2.0)
+observe(lambda engine, *block: engine.fill(*block), least=64.0)
 random = np.random.default_rng(1)
 scene = sarcl.Scene.points(random.uniform(-9, 9, (4000, 3)), random.standard_normal(4000))
 chirp = sarcl.Waveform.chirp(center=9.6e9, bandwidth=200e6, duration=5e-8)
@@ -247,7 +246,7 @@ def killed_runs(path, kills):
     rng, hit = random.Random(0), 0
     for _ in range(kills):
         before = len(tiles(path.parent))
-        process = subprocess.Popen([sys.executable, "-c", SCRIPT, str(path)], stdout=subprocess.DEVNULL)
+        process = subprocess.Popen([sys.executable, "-c", SCRIPT, str(path), TESTS], stdout=subprocess.DEVNULL)
         more = before + rng.randint(1, 3)
         while process.poll() is None and len(tiles(path.parent)) < more:
             time.sleep(0.001)
@@ -255,7 +254,7 @@ def killed_runs(path, kills):
         process.kill()
         hit += process.wait() == -signal.SIGKILL
         assert len(tiles(path.parent)) >= before or path.exists()  # no finished tile is lost
-    subprocess.run([sys.executable, "-c", SCRIPT, str(path)], check=True, stdout=subprocess.DEVNULL)
+    subprocess.run([sys.executable, "-c", SCRIPT, str(path), TESTS], check=True, stdout=subprocess.DEVNULL)
     return hit
 
 
@@ -272,30 +271,13 @@ def test_killed_runs_lose_no_tile_and_end_with_the_same_bits(tmp_path, kills):
 # ---- several devices
 
 
-def taken_by(monkeypatch, wait=True):
-    """The blocks that each device computes; none computes a second one before all have begun."""
-    taken, fill, begun = {}, EchoEngine.fill, threading.Barrier(2, timeout=60)
-
-    def counting(self, first, last, *rest):
-        device = self.scene.request.device
-        if device not in taken:
-            taken[device] = []
-            if wait:
-                begun.wait()
-        taken[device].append((first, last))
-        return fill(self, first, last, *rest)
-
-    monkeypatch.setattr(EchoEngine, "fill", counting)
-    return taken
-
-
 @pytest.mark.parametrize("case", CASES)
 def test_two_devices_of_a_kind_make_the_bits_of_one(case, pair, monkeypatch):
     scene, options = CASES[case]
     one = echo(scene, **options)
-    taken = taken_by(monkeypatch)
+    taken = observe_devices(monkeypatch)
     both = echo(scene, device=pair, **options)
-    assert set(taken) == set(pair) and same(both, one)
+    assert {engine.scene.request.device for engine in taken} == set(pair) and same(both, one)
     runs = sorted(run for part in taken.values() for run in part)
     assert [a for a, _ in runs] == [0, *(b for _, b in runs[:-1])] and runs[-1][1] == 200
     assert both.report.plan == one.report.plan and both.report.error_terms == one.report.error_terms
@@ -310,7 +292,7 @@ def test_devices_of_two_kinds_agree_to_rounding(monkeypatch):
     other = open_device(working[1]) if len(working) > 1 else first.without_fp64()
     for second in (other, as_gpu(first)):
         with monkeypatch.context() as during:
-            taken = taken_by(during)
+            taken = observe_devices(during)
             both = echo(POINTS + BOX, device=[first, second])
         assert len(taken) == 2
         one = echo(POINTS + BOX, device=first)
@@ -318,15 +300,15 @@ def test_devices_of_two_kinds_agree_to_rounding(monkeypatch):
 
 
 def test_the_pulses_of_a_device_that_is_lost_are_computed_by_the_other(pair, whole, monkeypatch, caplog, tmp_path):
-    fill, lost = EchoEngine.fill, {pair[1]}
+    lost = {pair[1]}
 
-    def failing(self, *rest):
-        if self.scene.request.device in lost:
+    def failing(engine, *block):
+        if engine.scene.request.device in lost:
             raise DeviceFailed("kernel spread failed: DEVICE_NOT_AVAILABLE")
         time.sleep(0.05)
-        return fill(self, *rest)
+        return engine.fill(*block)
 
-    monkeypatch.setattr(EchoEngine, "fill", failing)
+    observe(failing, monkeypatch.setattr)
     assert same(echo(device=pair), whole) and "the other devices go on without it" in caplog.text
     lost.add(pair[0])
     with pytest.raises(DeviceFailed, match="DEVICE_NOT_AVAILABLE"):

@@ -11,7 +11,7 @@ from sarcl import shapes
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.numerics import cost_model
 from sarcl.reference.equations import point_echo as exact_echo
-from sarcl.simulation import echo_check, kernel_images
+from sarcl.simulation import kernel_images
 from sarcl.simulation.facets import facet_spreading
 from sarcl.simulation.points import direct
 
@@ -42,6 +42,11 @@ def patches(monkeypatch):
     monkeypatch.setattr(cost_model, "PATCHES", 0.0)
 
 
+def plant(monkeypatch, error):
+    """Let the images of every kernel have this measured error, whatever the scatterers are."""
+    monkeypatch.setattr(kernel_images.PatchSamples, "error", lambda *_: error)
+
+
 @pytest.mark.parametrize("image", [-1, 1])
 def test_points_on_a_lattice_keep_the_tolerance_where_an_image_is_in_phase(device, monkeypatch, patches, image):
     track = still(seen_from(8e3, 0.6, 0.5))
@@ -51,13 +56,13 @@ def test_points_on_a_lattice_keep_the_tolerance_where_an_image_is_in_phase(devic
     scene = lattice(track, CHIRP.center + image * (rate - 0.4 * CHIRP.bandwidth))  # the image of the band's edge
     raw = sarcl.echo(scene, CHIRP, track, **options)
     assert error_of(raw, scene) <= raw.report.predicted_error <= 1e-3
-    monkeypatch.setattr(kernel_images, "SAFETY", 0.0)  # without the measured images the lattice breaks the tolerance
+    plant(monkeypatch, 0.0)  # without the measured images the lattice breaks the tolerance
     raw = sarcl.echo(scene, CHIRP, track, **options)
     assert error_of(raw, scene) > 1e-3
 
 
 def test_a_check_that_measures_more_than_the_tolerance_raises_and_keeps_the_echoes(monkeypatch, patches):
-    monkeypatch.setattr(kernel_images, "SAFETY", 0.0)
+    plant(monkeypatch, 0.0)
     track = still(seen_from(8e3, 0.6, 0.5))
     rate = 440 * CHIRP.bandwidth / 107
     scene = lattice(track, CHIRP.center - rate + 0.4 * CHIRP.bandwidth)
@@ -71,7 +76,7 @@ def test_a_check_that_measures_more_than_the_tolerance_raises_and_keeps_the_echo
 @pytest.mark.parametrize("array", [None, sarcl.AntennaArray.linear(9, spacing=0.015, frequency_step=1e6)])
 @pytest.mark.parametrize("add", [sarcl.Scene.points([[1.0, 2.0, 0.0]]), shapes.plate((2, 2), two_sided=False)])
 def test_a_lattice_that_no_plan_can_take_is_refused_in_the_numbers_of_the_caller(monkeypatch, patches, array, add):
-    monkeypatch.setattr(kernel_images, "SAFETY", 1e9)  # images of every kernel exceed the tolerance
+    plant(monkeypatch, 1e9)
     track = sarcl.Trajectory.line(start=(8e3, 3e3, 6e3), velocity=(0, 10, 0), prf=100.0, n_pulses=24)
     scene = lattice(track, 9e9) + add
     options = {k: v for k, v in WINDOW.items() if k != "check"} | {"array": array}
@@ -89,9 +94,8 @@ def test_few_scatterers_take_the_plan_for_the_worst_case_and_sample_no_patches(m
         assert error_of(raw, scene) <= raw.report.predicted_error <= 1e-3
 
 
-def test_random_phases_of_rough_ground_need_neither(monkeypatch):
+def test_random_phases_of_rough_ground_need_neither(monkeypatch, patches):
     monkeypatch.setattr(facet_spreading, "sample_patches", None)
-    monkeypatch.setattr(cost_model, "PATCHES", 0.0)
     rough = sarcl.Material(eps_r=4.0, height=np.inf, diagram="cos")
     track = sarcl.Trajectory.line(start=(8e3, 0, 6e3), velocity=(0, 10, 0), prf=100.0, n_pulses=4)
     raw = sarcl.echo(shapes.plate((4, 4), material=rough), CHIRP, track, tolerance=1e-2, check=True)
@@ -99,10 +103,8 @@ def test_random_phases_of_rough_ground_need_neither(monkeypatch):
 
 
 @pytest.mark.slow
-def test_the_pieces_of_a_plate_keep_the_tolerance(monkeypatch, patches):
+def test_the_pieces_of_a_plate_keep_the_tolerance(patches):
     # measured 1.5e-3 for 9.98e-4 predicted where the pieces were taken to add up at random phases
-    monkeypatch.setattr(echo_check, "MOST_DRAWS", 24)
-    monkeypatch.setattr(echo_check, "FACET_SAMPLES", 24**2 * 20_000)
     scene = shapes.plate((6, 6), edge=1.5, two_sided=False)
     track = sarcl.Trajectory.circle(radius=8e3, height=6e3, arc=0.02, n_pulses=24, prf=100.0, center=(0, 0, 0))
     raw = sarcl.echo(scene, CHIRP, track, check=True, shadows=False, tolerance=1e-3)

@@ -106,7 +106,7 @@ def conductor(
         touched = _any_of_four(free[b] < 1, free[c] < 1, a, False) | _any_of_four(inside, inside, a, False)
         at = np.flatnonzero(live & touched)
         corners, lengths = _around(inside, free, a, at)
-        area = _free_area(corners, lengths)
+        area = free_area(corners, lengths)
         if areas is not None:
             area = areas[a].free(box.in_grid(lattice, at, 0), area)
         some = ((lengths < 1) & (lengths > 0)).any(axis=0) | (area < 1)
@@ -211,7 +211,7 @@ def _around(inside: np.ndarray, free: np.ndarray, axis: int, at: np.ndarray) -> 
     return corners, np.stack([moved(values, steps, 1) for values, steps in edges])
 
 
-def _free_area(corner: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+def free_area(corner: np.ndarray, lengths: np.ndarray) -> np.ndarray:
     """Share of faces that is outside the body, by straight lines between cut edges; arguments as from `_around`."""
     c_high, c_low, b_high, b_low = lengths
     along_b, along_c = (b_low, b_low, b_high, b_high), (c_low, c_high, c_low, c_high)  # the edges that meet a corner

@@ -223,9 +223,12 @@ class FullwaveTask:
 
             part_echoes, ended = runs.run(
                 self.device, self.lattice, self.target, self.band, self.wavenumbers[part],
-                anchor=(self.tx[pulse], self.senses(self.tx[pulse])[sent]), twin=twin, tx=tx, rx=rx,
-                received=np.stack([senses[name] for name in received]), tolerance=LEFT * self.options.tolerance,
-                most_steps=int(runs.MOST_STEPS * self.cost.steps), max_bytes=self.max_bytes, progress=share_done,
+                anchor=runs.Anchor(self.tx[pulse], self.senses(self.tx[pulse])[sent], twin),
+                antennas=runs.Antennas(tx, rx, np.stack([senses[name] for name in received])),
+                options=runs.RunOptions(
+                    tolerance=LEFT * self.options.tolerance, most_steps=int(runs.MOST_STEPS * self.cost.steps),
+                    max_bytes=self.max_bytes, progress=share_done,
+                ),
             )  # fmt: skip
             turn = np.exp(-2j * np.outer(path, self.wavenumbers[part]))[:, None]
             for whole_band, echoes in zip(formed, part_echoes, strict=True):

@@ -60,7 +60,7 @@ class TiledFacets(TiledScatterers):
         """antennas, waveform, weights  of all channels: samples of patches are computed for them
         stays  False: pieces that a device cuts do not stay on it
         """
-        device, self.stays = request.device, stays
+        device, self.stays, self.limits = request.device, stays, request.limits
         self.of = lambda some: TiledFacets(request, some, plan, antennas, waveform, weights)
         self.facets, self.facet_plan, nodes = facets, plan, plan.nodes
         self.metal = all(np.isinf(m.conductivity) for m in facets.materials)
@@ -163,8 +163,8 @@ class FacetSpreader:
             self.pulse_nodes = every(len(antennas))
         else:
             highest = float(view.frequencies[-1])
-            names = self.polarizations
-            self.pulse_nodes = plan_pulse_nodes(facets, view.weights, names, view.vertical, highest, most)
+            names, worth = self.polarizations, tiled.limits.own_amplitudes
+            self.pulse_nodes = plan_pulse_nodes(facets, view.weights, names, view.vertical, highest, most, worth)
         self.plan = tiled.plan(antennas, view.band, room - self.pulse_nodes.error, least_tolerance=0.0)
         self.predicted_error = self.plan.predicted_error + facet_plan.predicted_error + self.pulse_nodes.error
         self.basis = facet_plan.basis(view.frequencies).astype(np.float32)

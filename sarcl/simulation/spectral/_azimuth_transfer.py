@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -182,14 +183,27 @@ class SeenScatterers:
     slant_range: np.ndarray
 
 
-def plan_transfer(
-    aspects: Aspects, functions: Functions, factors: np.ndarray, track: StraightTrack, reach: tuple[float, float],
-    tolerance: float, asked: float, time: PlanningTime, groups: Sequence[SeenScatterers] = (),
-) -> AzimuthTransfer:  # fmt: skip
-    """The smallest tables whose responses differ from the formula by at most `tolerance`.
+class AllowedError(NamedTuple):
+    """Error that transfer functions may have, and the tolerance that was asked for, of which it is a share."""
 
-    factors    of some scatterers (n, J);  asked  the whole tolerance, for the message;  time  that the plan may take
-    groups     of scatterers whose samples are compared too, at the pulses that there are
+    error: float
+    tolerance: float
+
+
+def plan_transfer(
+    aspects: Aspects,
+    functions: Functions,
+    factors: np.ndarray,
+    track: StraightTrack,
+    reach: tuple[float, float],
+    allowed: AllowedError,
+    time: PlanningTime,
+    groups: Sequence[SeenScatterers] = (),
+) -> AzimuthTransfer:
+    """The smallest tables whose responses differ from the formula by no more than is allowed.
+
+    factors  of some scatterers (n, J);  time  that the plan may take
+    groups   of scatterers whose samples are compared too, at the pulses that there are
     """
     best, n_lags = np.inf, lags_of(track, reach)
     some, n_functions = factors[:TESTED].shape
@@ -201,10 +215,10 @@ def plan_transfer(
         error = max(error, *(_seen_error(transfer, functions, group, track, reach) for group in groups), 0.0)
         error *= SAFETY
         best = min(best, error)
-        if error <= tolerance:
+        if error <= allowed.error:
             return replace(transfer, error=error)
     raise ToleranceUnreachable(
-        asked,
+        allowed.tolerance,
         None,
         "transform along the track of beams with edges",
         "use echo",

@@ -14,15 +14,22 @@ from ...scattering.facets import POLARIZATIONS, FacetSet, diagram_macros, vertic
 from ._scatterer_amplitudes import ScattererAmplitudes
 from ._straight_track import tangent
 
-AT_ONCE = 2**18  # facets per block
 KEPT = 4  # share of max_bytes, 1/n: blocks are kept on the device up to this, else made anew for every term
 
 
 class FacetFactors:
     """Amplitudes of some facets, seen from a straight track, weights of antennas included."""
 
-    def __init__(self, device: Device, amplitudes: ScattererAmplitudes, some: np.ndarray, budget: float) -> None:
-        """some  indices of the facets (n,);  budget  bytes"""
+    def __init__(
+        self,
+        device: Device,
+        amplitudes: ScattererAmplitudes,
+        some: np.ndarray,
+        budget: float,
+        at_once: int = 2**18,
+    ) -> None:
+        """some  indices of the facets (n,);  budget  bytes;  at_once  facets of a block, some 40 MB on the host"""
+        self.at_once = at_once
         facets, weights = amplitudes.part, amplitudes.weights
         assert isinstance(facets, FacetSet)
         self.device, self.amplitudes, self.facets, self.some = device, amplitudes, facets, some
@@ -46,8 +53,8 @@ class FacetFactors:
     def _made(self) -> Iterator[tuple[slice, Any, Any]]:
         """Blocks of the facets, with the kernel's planes of each."""
         track = self.amplitudes.track
-        for start in range(0, len(self.some), AT_ONCE):
-            block = slice(start, min(start + AT_ONCE, len(self.some)))
+        for start in range(0, len(self.some), self.at_once):
+            block = slice(start, min(start + self.at_once, len(self.some)))
             here = self.some[block]
             order = np.minimum(np.arange(self._padded(len(here))), len(here) - 1)
             planes = self.facets.picked(here).planes(order, np.zeros(0), True, False)

@@ -21,6 +21,7 @@ from ._aspects_seen import aspects_seen, check_doppler, check_spread, inner_aspe
 from ._azimuth_transfer import SAFETY as RESPONSE_SAFETY
 from ._azimuth_transfer import (
     TESTED,
+    AllowedError,
     AzimuthTransfer,
     SeenScatterers,
     compared_samples,
@@ -253,8 +254,9 @@ def _transfer(
         groups.append(_brightest(amplitudes, track, drawn, factors, task.band))
     factors = factors[np.argsort(-np.abs(factors).sum(axis=1), kind="stable")]
     if task.variant == "exact":
+        allowed = AllowedError(of_transfer, task.asked)
         return factors, plan_transfer(
-            seen_aspects, expansion.functions, factors, track, reach.ends, of_transfer, task.asked, task.time, groups
+            seen_aspects, expansion.functions, factors, track, reach.ends, allowed, task.time, groups
         )
     n_lags = lags_of(track, reach.ends)
     task.time.spend(compared_samples(1, len(expansion), n_lags), n_lags)

@@ -38,8 +38,7 @@ ANTENNAS = {
 
 
 @pytest.mark.parametrize("material, antenna", thinned(MATERIALS, ANTENNAS))
-def test_factors_of_facets_are_their_amplitudes(material, antenna, every_device, monkeypatch):
-    monkeypatch.setattr(factors, "AT_ONCE", 100)  # blocks
+def test_factors_of_facets_are_their_amplitudes(material, antenna, every_device):
     line = sarcl.Trajectory.line(start=(0, -60, 6e3), velocity=(0, 100, 0), prf=250, n_pulses=40)
     track = pointing.stripmap(line, look=float(np.arctan2(8e3, 6e3)), side="right")
     axis = np.linspace(-6, 6, 9)
@@ -59,7 +58,7 @@ def test_factors_of_facets_are_their_amplitudes(material, antenna, every_device,
     )
     some = np.flatnonzero(np.random.default_rng(2).random(len(facets)) < 0.8)
     for budget in (1e9, 1.0):
-        held = factors.FacetFactors(every_device, amplitudes, some, budget)
+        held = factors.FacetFactors(every_device, amplitudes, some, budget, at_once=100)
         for sine, frequency in ((-0.004, 9.55e9), (0.003, 9.67e9)):
             wanted = amplitudes(some, sine, frequency)
             found = held(sine, frequency)

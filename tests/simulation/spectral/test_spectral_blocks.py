@@ -9,10 +9,11 @@ import subprocess
 import sys
 import threading
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.block_runs import Stopped, names, tiles
+from helpers.block_runs import Stopped, begin_earlier, names, observe, observe_devices, tiles
 from helpers.devices import as_gpu
 
 import sarcl
@@ -22,7 +23,6 @@ from sarcl.cli import parser
 from sarcl.opencl.choose_device import open_device
 from sarcl.opencl.device_list import devices
 from sarcl.opencl.failures import DeviceFailed
-from sarcl.simulation.spectral._spectral_blocks import SpectrumEngine
 
 CHIRP = sarcl.Waveform.chirp(center=9.6e9, bandwidth=150e6, duration=2e-6)
 TRACK = sarcl.Trajectory.line(start=(0, -60, 6e3), velocity=(0, 100, 0), prf=250, n_pulses=300)
@@ -93,8 +93,8 @@ def test_a_piece_of_finished_echoes_does_nothing(tmp_path):
 
 
 def test_a_run_that_was_stopped_goes_on(whole, tmp_path, monkeypatch):
-    monkeypatch.setattr(checkpoint, "PERIOD", 0.0)
-    monkeypatch.setattr(SpectrumEngine, "least", 0.0)
+    begin_earlier(2.0, monkeypatch.setattr)
+    observe(lambda engine, *block: engine.fill(*block), monkeypatch.setattr, least=0.0)
 
     def stop(stage, done, total):
         if stage == "spectra" and done > 0.6 * total:
@@ -111,7 +111,7 @@ def test_a_run_that_was_stopped_goes_on(whole, tmp_path, monkeypatch):
 
 
 def test_a_full_disk_for_tiles_is_a_warning_and_the_echoes_are_made(whole, tmp_path, monkeypatch, caplog):
-    monkeypatch.setattr(checkpoint, "PERIOD", 0.0)
+    begin_earlier(2.0, monkeypatch.setattr)
 
     def full(*_):
         raise OSError(28, "No space left on device")
@@ -143,13 +143,15 @@ def test_tiles_of_other_echoes_are_refused_with_what_differs(tmp_path, name):
     assert names(tmp_path) == ["a.h5.parts"]
 
 
+TESTS = str(Path(__file__).parents[2])
 SCRIPT = """
 import sys
+sys.path.append(sys.argv[2])
 import numpy as np
 import sarcl
-from sarcl.blocks import checkpoint
-from sarcl.simulation.spectral._spectral_blocks import SpectrumEngine
-checkpoint.PERIOD, SpectrumEngine.least = 0.0, 0.0
+from helpers.block_runs import begin_earlier, observe
+begin_earlier(2.0)
+observe(lambda engine, *block: engine.fill(*block), least=0.0)
 random = np.random.default_rng(1)
 places = random.uniform(-0.5, 0.5, (4000, 3)) * (100, 60, 10) + (8e3, 0, 0)
 scene = sarcl.Scene.points(places, random.standard_normal(4000))
@@ -166,14 +168,14 @@ def test_killed_runs_lose_no_tile_and_end_with_the_same_bits(tmp_path):
     path, hit = tmp_path / "killed" / "a.h5", 0
     for number in range(4):
         before = len(tiles(path.parent))
-        process = subprocess.Popen([sys.executable, "-c", SCRIPT, str(path)])
+        process = subprocess.Popen([sys.executable, "-c", SCRIPT, str(path), TESTS])
         while process.poll() is None and len(tiles(path.parent)) < before + 1 + number:
             time.sleep(0.001)
         process.kill()
         hit += process.wait() == -signal.SIGKILL
         assert len(tiles(path.parent)) > before or path.exists()
     for name in ("killed/a.h5", "b.h5"):
-        subprocess.run([sys.executable, "-c", SCRIPT, str(tmp_path / name)], check=True)
+        subprocess.run([sys.executable, "-c", SCRIPT, str(tmp_path / name), TESTS], check=True)
     assert hit >= 3 and names(tmp_path / "killed") == ["a.h5"]
     assert same(sarcl.read(path), sarcl.read(tmp_path / "b.h5"))
 
@@ -181,25 +183,10 @@ def test_killed_runs_lose_no_tile_and_end_with_the_same_bits(tmp_path):
 # ---- several devices
 
 
-def taken_by(monkeypatch):
-    """The blocks that each device computes; none computes a second one before both have begun."""
-    taken, fill, begun = {}, SpectrumEngine.fill, threading.Barrier(2, timeout=60)
-
-    def counting(self, first, last, *rest):
-        if self not in taken:
-            taken[self] = []
-            begun.wait()
-        taken[self].append((first, last))
-        return fill(self, first, last, *rest)
-
-    monkeypatch.setattr(SpectrumEngine, "fill", counting)
-    return taken
-
-
 @pytest.mark.parametrize("case", CASES)
 def test_two_devices_of_a_kind_make_the_bits_of_one(case, pair, whole, monkeypatch):
     one = whole(case)
-    taken = taken_by(monkeypatch)
+    taken = observe_devices(monkeypatch)
     both = of(case, device=pair)
     assert len(taken) == 2 and same(both, one)
     assert both.report.device == f"{pair[0].info.name} + {pair[1].info.name}"
@@ -212,22 +199,22 @@ def test_devices_of_two_kinds_agree_to_rounding(whole, monkeypatch):
     one = whole("both").samples[:]
     for second in (other, as_gpu(first)):
         with monkeypatch.context() as during:
-            taken = taken_by(during)
+            taken = observe_devices(during)
             both = of("both", device=[first, second]).samples[:]
         assert len(taken) == 2 and np.linalg.norm(both - one) <= 1e-6 * np.linalg.norm(one)
 
 
 def test_the_spectra_of_a_device_that_is_lost_are_computed_by_the_other(pair, whole, monkeypatch, caplog):
-    fill, lost = SpectrumEngine.fill, set()
+    lost = set()
 
-    def failing(self, first, last, *rest):
-        if not lost or self in lost:
-            lost.add(self)
-            fill(self, first, last, *rest)  # what it has written is not added to
+    def failing(engine, *block):
+        if not lost or engine in lost:
+            lost.add(engine)
+            engine.fill(*block)  # what it has written is not added to
             raise DeviceFailed("kernel spread failed: DEVICE_NOT_AVAILABLE")
-        return fill(self, first, last, *rest)
+        return engine.fill(*block)
 
-    monkeypatch.setattr(SpectrumEngine, "fill", failing)
+    observe(failing, monkeypatch.setattr)
     assert same(of("both", device=pair), whole("both")) and "the other devices go on without it" in caplog.text
 
 
