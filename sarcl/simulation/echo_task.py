@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..base.validation import instance
+from ..model.antenna import Antenna
 from ..model.trajectory import Trajectory
 from ..model.waveform import Waveform
 from ..opencl.device import Device
@@ -53,6 +54,7 @@ class EchoTask:
 def echo_task(scene: Scene, waveform: Waveform, track: Trajectory, options: EchoOptions) -> EchoTask:
     """The task of these arguments; opens the device."""
     check_subjects(scene, waveform, track)
+    _check_bounces(options)
     devices = options.devices()
     request = replace(
         EchoRequest.of(options, scene, devices[0]),
@@ -79,6 +81,27 @@ def echo_task(scene: Scene, waveform: Waveform, track: Trajectory, options: Echo
         weights=weights,
         devices=devices,
     )
+
+
+def _check_bounces(options: EchoOptions) -> None:
+    """ValueError for options that do not go with several reflections."""
+    if options.bounces == 1:
+        return
+    several = f"bounces is {options.bounces}"
+    if not options.shadows:
+        raise ValueError(
+            f"{several} with shadows=False; what reflects to another facet also shades it: give shadows=True"
+        )
+    if options.array is not None:
+        raise ValueError(
+            f"{several} with an array; several reflections are computed for one antenna or a pair: give bounces=1"
+        )
+    antennas = options.antenna if isinstance(options.antenna, (tuple, list)) else (options.antenna,)
+    if any(isinstance(one, Antenna) and one.two_way for one in antennas):
+        raise ValueError(
+            f"{several} with a two-way pattern; waves leave and arrive in different directions after several "
+            "reflections: give the pattern of one way"
+        )
 
 
 def check_subjects(scene: object, waveform: object, track: object) -> None:

@@ -46,6 +46,7 @@ class EchoKeywords(TypedDict, total=False):
     antenna: Antenna | tuple[Antenna, Antenna] | None
     radar: Radar | None
     shadows: bool
+    bounces: int
     seed: int
     max_edge: float | Literal["auto"] | None
     max_bytes: float | None
@@ -71,6 +72,7 @@ class SpectralEchoKeywords(TypedDict, total=False):
     ripple: bool
     receiver: Trajectory | None
     array: AntennaArray | None
+    bounces: int
     range_window: ArrayLike | None
     skip: bool | Collection[Literal["zero reflectivity", "facing away", "range window"]]
     max_bytes: float | None
@@ -185,6 +187,7 @@ def echo(
     antenna: Antenna | tuple[Antenna, Antenna] | None = None,
     radar: Radar | None = None,
     shadows: bool = True,
+    bounces: int = 1,
     seed: int = 0,
     max_edge: float | Literal["auto"] | None = "auto",
     max_bytes: float | None = None,
@@ -222,6 +225,7 @@ def echo(
     antenna: Antenna | tuple[Antenna, Antenna] | None = None,
     radar: Radar | None = None,
     shadows: bool = True,
+    bounces: int = 1,
     seed: int = 0,
     max_edge: float | Literal["auto"] | None = "auto",
     max_bytes: float | None = None,
@@ -259,6 +263,7 @@ def echo(
     antenna: Antenna | tuple[Antenna, Antenna] | None = None,
     radar: Radar | None = None,
     shadows: bool = True,
+    bounces: int = 1,
     seed: int = 0,
     max_edge: float | Literal["auto"] | None = "auto",
     max_bytes: float | None = None,
@@ -290,6 +295,7 @@ def spectral_echo(
     ripple: bool = False,
     receiver: Trajectory | None = None,
     array: AntennaArray | None = None,
+    bounces: int = 1,
     range_window: ArrayLike | None = None,
     skip: bool | Collection[Literal["zero reflectivity", "facing away", "range window"]] = True,
     max_bytes: float | None = None,
@@ -324,6 +330,7 @@ def spectral_echo(
     ripple: bool = False,
     receiver: Trajectory | None = None,
     array: AntennaArray | None = None,
+    bounces: int = 1,
     range_window: ArrayLike | None = None,
     skip: bool | Collection[Literal["zero reflectivity", "facing away", "range window"]] = True,
     max_bytes: float | None = None,
