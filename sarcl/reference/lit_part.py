@@ -47,12 +47,16 @@ def area(corners: np.ndarray) -> float:
 
 
 def lit_pieces(facet: np.ndarray, shadows: list[np.ndarray]) -> list[np.ndarray]:
-    """Convex polygons (n, 2) that together are a facet less its shadows: each shadow cut off edge by edge."""
-    pieces = [(facet - facet.mean(axis=0)) @ plane_axes(facet)[:2].T]
+    """Convex polygons (n, 2) that together are a facet less its shadows."""
+    return cut_away([(facet - facet.mean(axis=0)) @ plane_axes(facet)[:2].T], shadows)
+
+
+def cut_away(pieces: list[np.ndarray], shadows: list[np.ndarray]) -> list[np.ndarray]:
+    """Convex polygons (n, 2) less shadows: each shadow cut off edge by edge."""
     for corners in shadows:
         left = []
         for piece in pieces:
-            for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+            for a, b in _edges(corners):
                 outside, piece = _halves(piece, a, b)
                 if len(outside) > 2:
                     left.append(outside)
@@ -60,6 +64,22 @@ def lit_pieces(facet: np.ndarray, shadows: list[np.ndarray]) -> list[np.ndarray]
                     break
         pieces = left
     return pieces
+
+
+def intersection(piece: np.ndarray, window: np.ndarray) -> np.ndarray:
+    """The part of a convex polygon (n, 2) inside a convex one, anticlockwise (m, 2)."""
+    for a, b in _edges(window):
+        piece = _halves(piece, a, b)[1]
+        if len(piece) < 3:
+            break
+    return piece
+
+
+def _edges(corners: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Ends of the edges of a polygon (n, 2), but those between corners that rounding alone keeps apart."""
+    after = np.roll(corners, -1, axis=0)
+    lengths = np.linalg.norm(after - corners, axis=1)
+    return [(a, b) for a, b, n in zip(corners, after, lengths, strict=True) if n > 1e-9 * lengths.max()]
 
 
 def _halves(piece: np.ndarray, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -139,14 +139,19 @@ class AntennaWeights:
 
     def weights(self, points: np.ndarray, pulse: int, frequency: float) -> np.ndarray:
         """Weights (n,), complex128, of points, m (n, 3), at one pulse: the reference of kernels/gains.clh."""
-        from ..model.antenna_pattern import two_way_gain
+        return self.of_paths(points - self.geometry.tx[pulse], points - self.geometry.rx[pulse], pulse, frequency)
 
-        out = np.ones(len(points), np.complex128)
-        tx, rx = self.geometry.tx[pulse], self.geometry.rx[pulse]
+    def of_paths(self, sent: np.ndarray, received: np.ndarray, pulse: int, frequency: float) -> np.ndarray:
+        """Weights (n,), complex128, of paths at one pulse: vectors m (n, 3) along which a wave leaves the transmitter,
+        as long as its way to the last scatterer, and from the receiver to that scatterer."""
+        from ..model.antenna_pattern import pattern_gain
+
+        out = np.ones(len(sent), np.complex128)
         if self.pair is not None and self.axes is not None:
-            out *= two_way_gain(self.pair, (self.axes[0][pulse], self.axes[1][pulse]), tx, rx, points, frequency)
+            for one, way, axes in zip(self.pair, (sent, received), self.axes, strict=True):
+                out *= 1 if one is None else pattern_gain(one, way @ axes[pulse], frequency)
         if self.radar is not None:
-            out *= self.range**2 * spreading(*(np.linalg.norm(points - end, axis=1) for end in (tx, rx)))
+            out *= self.range**2 * spreading(*(np.linalg.norm(way, axis=1) for way in (sent, received)))
         return out
 
     def at(self, geometry: PulseGeometry, pulses: slice = slice(None)) -> AntennaWeights:

@@ -17,6 +17,7 @@ For other folders:
     scene_preparation  a scene cut, culled and illuminated, and put on the device
     spreading          plan, tiles and sums that points and facets share
     track_options      options that every verb of echoes shares
+    bounces/           echoes of beams that facets reflect to one another
     channels/          echoes of the channels of an array
     edges/             echoes of the edges of conductors
     facets/            echoes of facets, directly or factorised

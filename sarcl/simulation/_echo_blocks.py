@@ -144,6 +144,7 @@ def description(task: EchoTask, shape: tuple[int, ...]) -> dict[str, Any]:
         "seed": options.seed,
         "edges": request.crease,
         "skip": ", ".join(sorted(request.skips)),
+        "bounces": str(request.bounces),
     }
     subjects = {"scene": task.original, "waveform": task.waveform, "track": task.given_track}
     return job_description(options, subjects, shape, named)

@@ -152,8 +152,10 @@ def _allotted(planned: PlannedEchoes) -> tuple[ErrorTerm, ...]:
         terms.append(ErrorTerm("points", share, SMALLER_TOLERANCE))
     if scene.subdivision is not None:
         terms.append(ErrorTerm("facets", share, SMALLER_TOLERANCE))
+        if request.bounces > 1:
+            terms.append(ErrorTerm("bounces", share, SMALLER_TOLERANCE))
         if samples_shadows(request, scene.seen):
-            most = SHADOWS * request.tolerance / parts_of(scene.seen.scene)
+            most = SHADOWS * request.tolerance / parts_of(request, scene.seen.scene)
             terms.append(ErrorTerm("shadows", most, SMALLER_TOLERANCE))
     if request.crease is not None:
         terms.append(ErrorTerm("edges", EDGES * request.tolerance, SMALLER_TOLERANCE))

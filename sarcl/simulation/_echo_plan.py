@@ -135,6 +135,8 @@ class EchoPlan:
             measured = channels.measured(prepared, output)
             clock.lap("check")
         plan = channels.words(planned.method, added.plan)  # type: ignore[arg-type]
+        if prepared.bounced is not None:
+            plan["contributions by reflections"] = added.counts.by_order()
         if n_kept:
             plan["from files"] = f"{n_kept} of {len(output)} pulses"
         report = Report(

@@ -21,7 +21,8 @@ def echo(scene: Scene, waveform: Waveform, track: Trajectory, options: EchoOptio
     """Echoes s_p(f) = sum_k a_k(p) W(f) exp(-j 2 pi f (tau_k(p) - tau_ref(p))) of every pulse, compressed.
 
     scene         points (|amplitude|^2 = RCS, m^2) and facets: physical optics with the materials' Fresnel
-                  coefficients, the exact phase of the wave over every facet, single scattering (docs/theory/facets.md)
+                  coefficients, the exact phase of the wave over every facet (docs/theory/facets.md); single scattering,
+                  or several reflections (docs/theory/bounces.md)
     track         transmitter; or a list of tracks: a list of phase histories is returned, each with the samples of a
                   call of its own. `receiver` is a list of as many then, and `out` a folder, with a file for each track
     {options}

@@ -12,6 +12,7 @@ from ..numerics.pulse_geometry import PulseGeometry
 from ..scattering.antenna_weights import AntennaWeights
 from ..scattering.facets import FacetSet, Light
 from ..scattering.scatterers import Points
+from .bounces.bounce_spreader import BounceScene, BounceSpreader
 from .edges.edge_echoes import EdgeEchoes
 from .facets.exact_facets import facet_samples, inside_window
 from .scene_echoes import SceneEchoes
@@ -22,6 +23,7 @@ MOST_DRAWS = 16  # pulses, and frequencies at each of them
 FEWEST_DRAWS, MANY_FACETS = (4, 2), 2_000_000  # up to so many facets, and above
 # s, to recompute the share of a facet in a sample, on one core; of a point, and where its gain changes over the band
 PER_FACET, PER_POINT, PER_GAIN = 5e-7, 1.5e-7, 1.3e-6
+MOST_REFLECTORS = 12  # facets whose reflections the reference follows
 PER_LIT_PART = 5e-3  # s, to recompute the lit part of a facet, past some ten occluders, on one core
 
 
@@ -109,6 +111,8 @@ def exact(
     if scene.edges is not None:
         value, power, _ = EdgeEchoes(scene.edges, view).samples(pulse, frequencies, exact=True)
         values, powers = values + value, powers + power
+    if scene.bounced is not None:
+        values = values + _bounced(scene.bounced, view, pulse)
     return values, powers
 
 
@@ -136,6 +140,30 @@ def _exact(part: Points | FacetSet, view: ChannelView, p: int) -> tuple[np.ndarr
         values[np.ix_(same, band)] = exact_echo(places, a, frequencies[band], *place)
         powers[np.ix_(same, band)] = (np.abs(a) ** 2).sum()
     return values, powers
+
+
+def _bounced(scene: BounceScene, view: ChannelView, pulse: int) -> np.ndarray:
+    """Samples (n_polarizations, n) of a pulse of what facets reflect to one another: by the reference, of few facets
+    without antennas' weights, and otherwise by the beams themselves, each added at every frequency."""
+    from ..reference.bounces import Reflectors, bounce_echo
+
+    antennas, surfaces, coatings = view.antennas, scene.surfaces, scene.coatings
+    values, counts = BounceSpreader(scene, view).values(np.array([pulse]), view.frequencies, exact=True)
+    if len(scene.mirrors) > MOST_REFLECTORS or view.weights.is_needed or counts.outside_window:
+        return np.asarray(values[0])
+    eps = np.stack([coatings.permittivity(f)[coatings.material] for f in view.frequencies.tolist()])
+    reflectivity = coatings.reflectivity * surfaces.mirrors
+    sums = bounce_echo(
+        Reflectors(surfaces.triangles, surfaces.two_sided, eps, reflectivity, coatings.height),
+        view.frequencies,
+        antennas.tx[pulse] - scene.origin,
+        antennas.rx[pulse] - scene.origin,
+        float(antennas.reference_range[pulse]),
+        bounces=scene.bounces,
+        up=tuple(view.vertical.tolist()),
+        on_plane=scene.surfaces.on_plane,
+    )[1:].sum(axis=0)
+    return np.stack([sums[:, "HV".index(name[0]), "HV".index(name[1])] for name in view.polarizations])
 
 
 def exact_light(part: FacetSet, antennas: PulseGeometry, pulse: int, frequencies: np.ndarray) -> Light:

@@ -54,7 +54,7 @@ class EchoRequest:
     """What is asked for, of every channel alike.
 
     tolerance  of each channel;  vertical  (3,);  budget  bytes on the device;  host  bytes for facets that are cut
-    method     by which points are added: "direct", "factorized" or "auto"
+    method     by which points are added: "direct", "factorized" or "auto";  bounces  reflections that are followed
     crease     rad, angle between normals of facets at an edge, at least; None: edges do not diffract
     """
 
@@ -73,6 +73,7 @@ class EchoRequest:
     limits: EchoLimits = EchoLimits()
     method: str = "direct"
     crease: float | None = None
+    bounces: int = 1
 
     @classmethod
     def of(cls, options: SceneOptions, scene: Scene, device: Device | None = None) -> EchoRequest:
@@ -90,6 +91,7 @@ class EchoRequest:
             shadows=options.shadows,
             seed=options.seed,
             progress=options.progress,
+            bounces=options.bounces,
         )
 
     def __getstate__(self) -> dict[str, Any]:

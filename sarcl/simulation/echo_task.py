@@ -9,6 +9,7 @@ import numpy as np
 
 from ..base.errors import NotApplicable
 from ..base.validation import instance
+from ..model.antenna import Antenna
 from ..model.trajectory import Trajectory
 from ..model.waveform import Waveform
 from ..opencl.device import Device
@@ -56,6 +57,7 @@ class EchoTask:
 def echo_task(scene: Scene, waveform: Waveform, track: Trajectory, options: EchoOptions) -> EchoTask:
     """The task of these arguments; opens the device."""
     check_subjects(scene, waveform, track)
+    _check_bounces(options)
     devices = options.devices()
     request = replace(
         EchoRequest.of(options, scene, devices[0]),
@@ -71,6 +73,11 @@ def echo_task(scene: Scene, waveform: Waveform, track: Trajectory, options: Echo
     if len(real.triangles):
         if options.shadows:
             refuse_hidden_by_sheets(real)
+        if options.bounces > 1 and real.sheets.any():
+            raise NotApplicable(
+                f"bounces is {options.bounces}, and the scene has thin sheets (a material with a thickness), of which "
+                "single reflections alone are computed: give bounces=1, or materials without thickness"
+            )
         tx, rx = sends.positions, echo_sampling.receiver_positions(sends, hears)
         if options.forward and not np.array_equal(tx, rx):
             refuse_forward(options, real)
@@ -103,10 +110,9 @@ def refuse_hidden_by_sheets(scene: Scene) -> None:
 
 def refuse_forward(options: EchoOptions, scene: Scene) -> None:
     """NotApplicable for arrays and surfaces of which forward scatter is not computed."""
-    if options.edges:
-        raise NotApplicable(
-            "forward=True is not computed with edges=True: the waves of edges fade behind a body; take one"
-        )
+    for name, value in (("edges=True", options.edges), (f"bounces={options.bounces}", options.bounces > 1)):
+        if value:
+            raise NotApplicable(f"forward=True is not computed together with {name}; give one of them")
     if options.array is not None:
         raise NotApplicable("forward=True is for one transmitter and one receiver, not for an array")
     if random(scene).any():
@@ -114,6 +120,27 @@ def refuse_forward(options: EchoOptions, scene: Scene) -> None:
         raise NotApplicable(
             f"forward=True is for coherent surfaces, and facet {row} has a random echo (roughness, or a diagram of its "
             "material): give roughness=0 and a smooth material"
+        )
+
+
+def _check_bounces(options: EchoOptions) -> None:
+    """ValueError for options that do not go with several reflections."""
+    if options.bounces == 1:
+        return
+    several = f"bounces is {options.bounces}"
+    if not options.shadows:
+        raise ValueError(
+            f"{several} with shadows=False; what reflects to another facet also shades it: give shadows=True"
+        )
+    if options.array is not None:
+        raise ValueError(
+            f"{several} with an array; several reflections are computed for one antenna or a pair: give bounces=1"
+        )
+    antennas = options.antenna if isinstance(options.antenna, (tuple, list)) else (options.antenna,)
+    if any(isinstance(one, Antenna) and one.two_way for one in antennas):
+        raise ValueError(
+            f"{several} with a two-way pattern; waves leave and arrive in different directions after several "
+            "reflections: give the pattern of one way"
         )
 
 

@@ -19,6 +19,7 @@ from ..scattering.facets import FacetSet
 from ..scattering.scatterers import Points
 from ..scattering.subdivision import Subdivision
 from ._unseen_scene import OUTSIDE_BEAM, OUTSIDE_WINDOW
+from .bounces.bounce_spreader import BounceScene, BounceSpreader
 from .echo_request import EchoRequest
 from .edges.edge_echoes import EdgeEchoes, PreparedEdges
 from .facets.exact_facets import ExactFacets
@@ -27,9 +28,10 @@ from .facets.facet_spreading import FacetSpreader, TiledFacets
 from .factorized.spreader import FactorizedSpreader
 from .points.direct import PointSpreader
 from .points.point_plan import PointPlan, PreparedPoints
-from .scene_plan import NODES
+from .scene_plan import NODES, model_words
 from .spreading import Band, ChannelView, Counts
 
+Spreader = FacetSpreader | ExactFacets | FactorizedSpreader | BounceSpreader | EdgeEchoes
 UNKNOWN_SHADOWS = {"shadow edges": "sampled, not part of the error"}  # for the report
 
 
@@ -47,6 +49,7 @@ class SceneEchoes:
     error_budget           the share of the tolerance that points have, and facets
     shadow_terms           errors of shadows that are counted in samples, relative to the norm of the facets
     edges                  edges that diffract, None where none are asked for
+    bounced                facets that reflect to one another, None where a single reflection counts
     """
 
     request: EchoRequest
@@ -63,6 +66,7 @@ class SceneEchoes:
     shadow_terms: tuple[ErrorTerm, ...]
     n_pulses: int
     edges: PreparedEdges | None = None
+    bounced: BounceScene | None = None
 
     def __len__(self) -> int:
         """Number of points, facets and pieces of edges."""
@@ -147,7 +151,7 @@ class SceneEchoes:
         )
         points: PointSpreader | None = None
         parts: list[tuple[ErrorTerm, dict[str, Any]]] = []
-        spreaders: list[FacetSpreader | ExactFacets | FactorizedSpreader | EdgeEchoes] = []
+        spreaders: list[Spreader] = []
         stop, reason = first + len(antennas), ""
         if self.points is not None and self.prepared_points is not None and request.same:
             nodes = chebyshev(waveform.center, waveform.bandwidth, self.n_nodes)
@@ -182,8 +186,11 @@ class SceneEchoes:
         if self.edges is not None:
             edges = EdgeEchoes(self.edges, view)
             spreaders.append(edges)
-        chosen = max(parts, key=lambda part: part[0].value)[1] if parts else {}
-        model = {"model": "stop and go, single scattering"} if parts else {}
+        if self.bounced is not None:
+            spreaders.append(BounceSpreader(self.bounced, view))
+            parts.append((ErrorTerm("bounces", self.bounced.tolerance, SMALLER_TOLERANCE), {}))
+        chosen = max(parts, key=lambda part: (bool(part[1]), part[0].value))[1] if parts else {}
+        model = {"model": model_words(request)} if parts else {}
         words = {**model, **chosen, **(self.weights.describe(self.weight_error) if parts else {})}
         error_terms = *(term for term, _ in parts), *self.shadow_terms
         if self.edges is not None:
@@ -193,6 +200,7 @@ class SceneEchoes:
 
     def check_seen(self, counts: Counts, near: float, far: float) -> None:
         """NothingSeen where nothing at all was added within the range window from near to far, m."""
+        counts = replace(counts, pairs=counts.pairs - counts.unseen, unseen=0)
         if counts.outside_window == counts.pairs:
             raise NothingSeen(OUTSIDE_WINDOW.format(near, far))
         if counts.outside_window + counts.outside_beam == counts.pairs:
@@ -208,6 +216,8 @@ class SceneEchoes:
         skipped["facing away"] = skipped.get("facing away", 0) + counts.facing_away
         if self.weights.pair is not None:
             skipped["out of beam"] = counts.outside_beam
+        if self.bounced is not None:
+            skipped["no reflection from facet to facet"] = counts.unseen
         return {
             "contributions_done": counts.contributing,
             "contributions_skipped": {**skipped, "range window": counts.outside_window},
@@ -224,7 +234,7 @@ class ChannelEchoes:
 
     scene: SceneEchoes
     points: PointSpreader | None
-    spreaders: tuple[FacetSpreader | ExactFacets | FactorizedSpreader | EdgeEchoes, ...]
+    spreaders: tuple[Spreader, ...]
     error_terms: tuple[ErrorTerm, ...]
     plan: dict[str, Any]
 

@@ -18,6 +18,7 @@ FORWARD = (
     "shadow too; other bodies still block both ways. False: to a receiver in front of a facet alone, which holds for "
     "bistatic angles up to about 90 deg. Of no effect for one antenna"
 )
+MOST_BOUNCES = 8
 
 
 def _shadows(name: str, asked: object) -> bool:
@@ -26,6 +27,13 @@ def _shadows(name: str, asked: object) -> bool:
             "shadows is 'embree'; rays of Embree were taken out, since sarcl's own became faster and exact: give True"
         )
     return flag(name, asked)
+
+
+def _bounces(name: str, asked: object) -> int:
+    bounces = count(name, asked, 1)
+    if bounces > MOST_BOUNCES:
+        raise ValueError(f"{name} is {bounces}; give 1 to {MOST_BOUNCES} reflections")
+    return bounces
 
 
 def _max_edge(name: str, asked: object) -> float | str | None:
@@ -66,6 +74,12 @@ class SceneOptions(TrackOptions):
         "True: of every facet only the part counts that both antennas see at each pulse (docs/theory/shadows.md; "
         "points are always seen)",
         _shadows,
+    )
+    bounces: int = option(
+        1,
+        "1 to 8: reflections that are followed from facet to facet, conductors and dielectrics alike; the last one is "
+        "that of physical optics. Parts without coherent reflection are seen once (docs/theory/bounces.md)",
+        _bounces,
     )
     seed: int = option(
         0,

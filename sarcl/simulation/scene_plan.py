@@ -72,7 +72,13 @@ class ScenePlan:
         """Words and numbers for a forecast: those of a report that are known before the scene is prepared."""
         facets = {} if self.subdivision is None else self.subdivision.plan.describe()
         weights = self.seen.weights.describe(self.weight_error)
-        return {"model": "stop and go, single scattering", "method": "spread"} | facets | weights
+        return {"model": model_words(self.request), "method": "spread"} | facets | weights
+
+
+def model_words(request: EchoRequest) -> str:
+    """The model in words, for a report."""
+    several = f"up to {request.bounces} reflections"
+    return "stop and go, " + (several if request.bounces > 1 else "single scattering")
 
 
 def planned_scene(request: EchoRequest, seen: SeenScene, bands: Iterable[Band]) -> ScenePlan:
@@ -80,7 +86,8 @@ def planned_scene(request: EchoRequest, seen: SeenScene, bands: Iterable[Band]) 
 
     ToleranceUnreachable where it cannot meet the tolerance; NothingSeen where bounds prove that no pulse sees it.
     """
-    refuse_unseen(seen.scene, seen.weights, seen.waveform, seen.antennas, request.gated, seen.margin)
+    if request.bounces == 1:  # what several facets reflect may arrive from outside the scene's box
+        refuse_unseen(seen.scene, seen.weights, seen.waveform, seen.antennas, request.gated, seen.margin)
     error_budget = share_of(request, seen, request.tolerance)
     weight_error = error_of_weights(seen.weights, seen.scene, seen.waveform, request.polarizations, request.vertical)
     bands = tuple(dict.fromkeys(bands))
@@ -105,15 +112,17 @@ def cut_within(
         raise refused.restated(request.tolerance, reachable(plan, above), remedy) from None
 
 
-def parts_of(scene: Scene) -> float:
-    """By how much a tolerance is divided among the scene's parts: errors of points and of facets are independent."""
-    return float(np.sqrt(2 if len(scene.positions) and len(scene.triangles) else 1))
+def parts_of(request: EchoRequest, scene: Scene) -> float:
+    """By how much a tolerance is divided among the scene's parts: errors of points, of facets and of what these reflect
+    to one another are independent."""
+    has_facets = len(scene.triangles) > 0
+    return float(np.sqrt(max((len(scene.positions) > 0) + has_facets + (has_facets and request.bounces > 1), 1)))
 
 
 def share_of(request: EchoRequest, seen: SeenScene, tolerance: float) -> float:
     """The share of a tolerance that points have, and facets, beside those of edges and of shadows in samples."""
     others = SHADOWS**2 * samples_shadows(request, seen) + EDGES**2 * (request.crease is not None)
-    return float(tolerance * np.sqrt(1 - others) / parts_of(seen.scene))
+    return float(tolerance * np.sqrt(1 - others) / parts_of(request, seen.scene))
 
 
 def samples_shadows(request: EchoRequest, seen: SeenScene) -> bool:

@@ -16,6 +16,7 @@ from ..scattering.rough_pieces import PIECE_BYTES, RoughFacets
 from ..scattering.scatterers import Points, facets_of, points_of
 from ..scattering.subdivision import Subdivision
 from ..scene.scene import Scene
+from .bounces.bounce_spreader import BounceScene
 from .echo_request import EchoRequest
 from .edges.edge_echoes import PreparedEdges
 from .facets.facet_spreading import TiledFacets
@@ -67,7 +68,7 @@ def _prepared(plan: ScenePlan, *, tiled: bool, exact: bool) -> SceneEchoes:
         shadows = ShadowRule(
             exact=exact,
             sampled=samples_shadows(request, seen),
-            accuracy=SHADOWS * request.tolerance / parts_of(seen.scene),
+            accuracy=SHADOWS * request.tolerance / parts_of(request, seen.scene),
             max_bytes=request.budget / 4,
             margin=seen.margin,
             host=request.host,
@@ -81,7 +82,9 @@ def _prepared(plan: ScenePlan, *, tiled: bool, exact: bool) -> SceneEchoes:
             progress=request.report,
         )
         skipped = {why: skipped.get(why, 0) + n for why, n in left_out.items()}
-    _check_left(request, points, facets, skipped)
+    bounced = BounceScene.of(seen.scene, request.bounces, plan.error_budget)
+    if bounced is None:
+        _check_left(request, points, facets, skipped)
     if points is not None:
         bounded(points.largest() * weights.peak)
         weights.check_clearance(points.positions)
@@ -98,6 +101,7 @@ def _prepared(plan: ScenePlan, *, tiled: bool, exact: bool) -> SceneEchoes:
         mesh_warnings=mesh_warnings,
         error_budget=plan.error_budget,
         shadow_terms=_shadow_terms(request, seen.scene, facets),
+        bounced=bounced,
         n_pulses=len(seen.antennas),
         edges=PreparedEdges.of(request, seen),
     )
@@ -150,7 +154,7 @@ def _shadow_terms(request: EchoRequest, scene: Scene, facets: Sequence[FacetSet]
     lights = [part.illumination for part in facets if part.illumination is not None and part.samples_incoherent_alone]
     if not lights:
         return ()
-    share, light = SHADOWS / parts_of(scene), lights[0]  # one for all
+    share, light = SHADOWS / parts_of(request, scene), lights[0]  # one for all
     if light.error > share * request.tolerance:
         raise _TooFewSamples(
             request.tolerance,

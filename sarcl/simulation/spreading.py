@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import zip_longest
 from typing import Any, Protocol
 
 import numpy as np
@@ -39,12 +40,16 @@ class Counts:
 
     outside_window  outside the range window;  facing_away  inside it, the facet seen from behind
     outside_beam    beyond the limits of an antenna's beam
+    unseen          pairs of a beam and a facet that it does not reach, or that the receiver does not see
+    orders          beams of 1, 2 ... reflections that contributed, where several are followed
     """
 
     pairs: int = 0
     outside_window: int = 0
     facing_away: int = 0
     outside_beam: int = 0
+    unseen: int = 0
+    orders: tuple[int, ...] = ()
 
     def __add__(self, other: Counts) -> Counts:
         return Counts(
@@ -52,12 +57,19 @@ class Counts:
             self.outside_window + other.outside_window,
             self.facing_away + other.facing_away,
             self.outside_beam + other.outside_beam,
+            self.unseen + other.unseen,
+            tuple(map(sum, zip_longest(self.orders, other.orders, fillvalue=0))),
         )
 
     @property
     def contributing(self) -> int:
         """Pairs that were added up."""
-        return self.pairs - self.outside_window - self.facing_away - self.outside_beam
+        return self.pairs - self.outside_window - self.facing_away - self.outside_beam - self.unseen
+
+    def by_order(self) -> str:
+        """Contributions of 1, 2 ... reflections, for a report."""
+        several = list(self.orders[1:])
+        return ", ".join(f"{i}: {n}" for i, n in enumerate([self.contributing - sum(several), *several], 1))
 
 
 @dataclass(frozen=True)

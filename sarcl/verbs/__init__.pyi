@@ -48,6 +48,7 @@ class EchoKeywords(TypedDict, total=False):
     antenna: Antenna | tuple[Antenna, Antenna] | None
     radar: Radar | None
     shadows: bool
+    bounces: int
     seed: int
     max_edge: float | Literal["auto"] | None
     max_bytes: float | None
@@ -73,6 +74,7 @@ class SpectralEchoKeywords(TypedDict, total=False):
     ripple: bool
     receiver: Trajectory | None
     array: AntennaArray | None
+    bounces: int
     range_window: ArrayLike | None
     skip: bool | Collection[Literal["zero reflectivity", "facing away", "range window"]]
     max_bytes: float | None
@@ -201,6 +203,7 @@ def echo(
     antenna: Antenna | tuple[Antenna, Antenna] | None = None,
     radar: Radar | None = None,
     shadows: bool = True,
+    bounces: int = 1,
     seed: int = 0,
     max_edge: float | Literal["auto"] | None = "auto",
     max_bytes: float | None = None,
@@ -239,6 +242,7 @@ def echo(
     antenna: Antenna | tuple[Antenna, Antenna] | None = None,
     radar: Radar | None = None,
     shadows: bool = True,
+    bounces: int = 1,
     seed: int = 0,
     max_edge: float | Literal["auto"] | None = "auto",
     max_bytes: float | None = None,
@@ -277,6 +281,7 @@ def echo(
     antenna: Antenna | tuple[Antenna, Antenna] | None = None,
     radar: Radar | None = None,
     shadows: bool = True,
+    bounces: int = 1,
     seed: int = 0,
     max_edge: float | Literal["auto"] | None = "auto",
     max_bytes: float | None = None,
@@ -308,6 +313,7 @@ def spectral_echo(
     ripple: bool = False,
     receiver: Trajectory | None = None,
     array: AntennaArray | None = None,
+    bounces: int = 1,
     range_window: ArrayLike | None = None,
     skip: bool | Collection[Literal["zero reflectivity", "facing away", "range window"]] = True,
     max_bytes: float | None = None,
@@ -342,6 +348,7 @@ def spectral_echo(
     ripple: bool = False,
     receiver: Trajectory | None = None,
     array: AntennaArray | None = None,
+    bounces: int = 1,
     range_window: ArrayLike | None = None,
     skip: bool | Collection[Literal["zero reflectivity", "facing away", "range window"]] = True,
     max_bytes: float | None = None,

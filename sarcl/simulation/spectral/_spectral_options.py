@@ -44,6 +44,7 @@ class SpectralEchoOptions(SceneOptions, BlockOptions):
         or_none(antenna_array),
         in_files=False,
     )
+    bounces: int = option(1, "not supported: 1")
     range_window: ArrayLike | None = option(
         None,
         "(near, far) m about the reference, default the smallest that holds the scene plus 10 %; it must hold every "

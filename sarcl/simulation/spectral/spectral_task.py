@@ -65,6 +65,8 @@ def spectral_task(
         raise NotApplicable("spectral_echo is for one antenna that transmits and receives; use echo for a receiver")
     if options.array is not None and not is_single(options.array):
         raise NotApplicable("spectral_echo takes no arrays; use echo, which computes their channels")
+    if options.bounces > 1:
+        raise NotApplicable(f"bounces is {options.bounces}; spectral_echo computes single reflections: use echo")
     if not track.stop_and_go:
         raise NotApplicable(
             "the track is that of an orbit, with the receiver where it is at the echo's arrival; spectral_echo is for "

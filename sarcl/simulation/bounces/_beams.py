@@ -1,0 +1,275 @@
+"""Beams that flat facets reflect: followed from facet to facet as convex polygons, less what lies in their way.
+
+A flat facet reflects the wave of a transmitter T as the wave of its mirror image. After facets 1 ... m - 1 it comes
+from T' = M_(m-1) ... M_1 T, and lights of facet m what lines from T' through the polygon on facet m - 1 meet. What lies
+in the way of an earlier leg is mirrored too, so that all shadows on facet m fall from T' (docs/theory/bounces.md).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ...base.vectors import dot, unit
+from ...scattering.physical_optics import normals_and_areas
+from ._facet_tree import Cones, FacetTree
+from ._polygons import Polygons, apart, folded, joined
+
+ON_PLANE = 1e-6  # of the scene's diagonal: corners nearer to a plane lie in it, as for shadows (visibility/lit_parts)
+SNAP = 1e-11  # of the diagonal: rounding of clipped corners
+LEAST_AREA = 1e-10  # of a facet: smaller polygons are rounding
+GRAZING = 1e-9  # sine of the angle between a facet and a ray, below which nothing is reflected
+MOST_ANGLE = 1.55  # rad, of a cone: wider ones hold everything in front
+ROWS_AT_ONCE = 200_000  # pairs of a beam and a facet that are looked at together
+
+
+@dataclass(frozen=True, eq=False)
+class Surfaces:
+    """Facets that reflect, triangles m (k, 3, 3) about the scene's centre; those not in `mirrors` only cast shadows.
+
+    two_sided, mirrors  (k,) bool
+    """
+
+    triangles: np.ndarray
+    two_sided: np.ndarray
+    mirrors: np.ndarray
+
+    @cached_property
+    def normals(self) -> np.ndarray:
+        """Unit normals (k, 3)."""
+        return normals_and_areas(self.triangles)[0]
+
+    @cached_property
+    def areas(self) -> np.ndarray:
+        """Areas, m^2 (k,)."""
+        return normals_and_areas(self.triangles)[1]
+
+    @cached_property
+    def centers(self) -> np.ndarray:
+        """Centroids, m (k, 3)."""
+        return np.asarray(self.triangles.mean(axis=1))
+
+    @cached_property
+    def diagonal(self) -> float:
+        """Diagonal of the box of all facets, m."""
+        corners = self.triangles.reshape(-1, 3)
+        return float(np.linalg.norm(corners.max(axis=0) - corners.min(axis=0)))
+
+    @cached_property
+    def tree(self) -> FacetTree:
+        """All facets by place."""
+        return FacetTree(self.triangles)
+
+    @property
+    def on_plane(self) -> float:
+        """Height, m, up to which corners lie in a plane."""
+        return ON_PLANE * self.diagonal
+
+    @property
+    def snap(self) -> float:
+        """Rounding of corners, m."""
+        return SNAP * self.diagonal
+
+    def facing(self, facets: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Unit normals (n, 3) of facets (n,) on the sides of places, m (n, 3); and whether these sides reflect (n,)."""
+        normal = self.normals[facets]
+        sine = dot(normal, unit(places - self.centers[facets]))
+        reflects = (np.abs(sine) > GRAZING) & ((sine > 0) | self.two_sided[facets]) & self.mirrors[facets]
+        return normal * np.where(sine < 0, -1.0, 1.0)[:, None], reflects
+
+
+@dataclass(frozen=True, eq=False)
+class Beams:
+    """Beams of one order: polygons on the last of m facets, at some pulses.
+
+    chain   number of the sequence of facets that reflect (k,), rising;  pulse  number of the antenna positions (k,)
+    chains  sequences of facets (c, m), and  normals  on the sides that reflect (c, m, 3)
+    apex    the transmitter's image in all facets but the last, m (k, 3)
+    """
+
+    chain: np.ndarray
+    pulse: np.ndarray
+    chains: np.ndarray
+    normals: np.ndarray
+    apex: np.ndarray
+    polygons: Polygons
+
+    def __len__(self) -> int:
+        return len(self.pulse)
+
+    def __getitem__(self, some: np.ndarray) -> Beams:
+        """Beams `some` (n,), in rising order."""
+        kept, chain = np.unique(self.chain[some], return_inverse=True)
+        chains, normals = self.chains[kept], self.normals[kept]
+        return Beams(chain, self.pulse[some], chains, normals, self.apex[some], self.polygons[some])
+
+    @property
+    def order(self) -> int:
+        """Number of facets m."""
+        return int(self.chains.shape[1])
+
+    @property
+    def last(self) -> np.ndarray:
+        """The last facet of each beam (k,)."""
+        return self.chains[self.chain, -1]
+
+    @cached_property
+    def first_of(self) -> np.ndarray:
+        """The first beam of each chain (c,)."""
+        return np.searchsorted(self.chain, np.arange(len(self.chains)))
+
+    def bounds(self, polygons: Polygons) -> tuple[np.ndarray, np.ndarray]:
+        """Centres, m (c, 3), and radii, m (c,), of spheres about polygons (k) of all beams of each chain."""
+        if not len(self):
+            return np.zeros((0, 3)), np.zeros(0)
+        low = np.minimum.reduceat(folded(np.minimum, polygons.corners.swapaxes(1, 2)), self.first_of)
+        high = np.maximum.reduceat(folded(np.maximum, polygons.corners.swapaxes(1, 2)), self.first_of)
+        return (low + high) / 2, np.linalg.norm(high - low, axis=1) / 2
+
+    def rows_of(self, chain: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Beams of each of the chains in a list (n,), one chain after the other, and places in that list."""
+        number = np.diff(np.append(self.first_of, len(self)))[chain]
+        place = np.repeat(np.arange(len(chain)), number)
+        within = np.arange(len(place)) - np.repeat(np.cumsum(number) - number, number)
+        return self.first_of[chain[place]] + within, place
+
+
+def mirrored(places: np.ndarray, normal: np.ndarray, point: np.ndarray) -> np.ndarray:
+    """Images of places, m (k, ..., 3), in planes through points, m (k, 3), with unit normals (k, 3)."""
+    shape = len(normal), *(1,) * (places.ndim - 2), 3
+    normal, point = normal.reshape(shape), point.reshape(shape)
+    return np.asarray(places - 2 * ((places - point) * normal).sum(axis=-1, keepdims=True) * normal)
+
+
+def first_facets(surfaces: Surfaces, tx: np.ndarray, turn: float) -> np.ndarray:
+    """Facets from which waves of transmitters, m (n, 3), may reach others.
+
+    turn  rad: directions from a facet to two of the transmitters, or receivers, differ by no more
+    """
+    facets, middle = np.flatnonzero(surfaces.mirrors), tx[len(tx) // 2]
+    sine = dot(surfaces.normals[facets], unit(middle - surfaces.centers[facets]))
+    facets = facets[(sine > -turn) | surfaces.two_sided[facets]]
+    image = mirrored(np.repeat(middle[None], len(facets), axis=0), surfaces.normals[facets], surfaces.centers[facets])
+    spheres = Polygons.of(surfaces.triangles[facets]).spheres
+    return np.asarray(facets[np.unique(_reached(surfaces, facets, *spheres, image, turn)[0])])
+
+
+def first(surfaces: Surfaces, tx: np.ndarray, facets: np.ndarray) -> Beams:
+    """Beams from transmitters, m (n, 3), to whole facets, of those that they see from a side that reflects."""
+    facet, pulse = np.repeat(facets, len(tx)), np.tile(np.arange(len(tx)), len(facets))
+    normal, reflects = surfaces.facing(facet, tx[pulse])
+    side = dot(normal, surfaces.normals[facet]) > 0
+    rows = np.flatnonzero(reflects)
+    facet, pulse, normal = facet[rows], pulse[rows], normal[rows]
+    none = np.zeros((len(rows), 0), np.int64), np.zeros((len(rows), 0, 3))
+    return _sorted(
+        2 * facet + side[rows], *none, pulse, facet, normal, tx[pulse], Polygons.of(surfaces.triangles[facet])
+    )
+
+
+def reached(surfaces: Surfaces, beams: Beams, turn: float) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs (p,), (p,) of a chain of beams and a facet that these may reach next; turn  as of `first_facets`."""
+    last, normal = beams.chains[:, -1], beams.normals[:, -1]
+    image = mirrored(beams.apex[beams.first_of], normal, surfaces.centers[last])
+    chain, facet = _reached(surfaces, last, *beams.bounds(beams.polygons), image, 2 * turn)
+    height = dot3(surfaces.triangles[facet] - surfaces.centers[last[chain], None], normal[chain])
+    some = height.max(axis=1, initial=-np.inf) > surfaces.on_plane
+    return chain[some], facet[some]
+
+
+def _reached(
+    surfaces: Surfaces, last: np.ndarray, center: np.ndarray, radius: np.ndarray, image: np.ndarray, turn: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Pairs of a sphere on facet `last` (c,) and a facet in the cone from an image, m (c, 3), that may face it."""
+    which, facet = surfaces.tree.within(_cones(center, radius, image, turn))
+    some = (facet != last[which]) & surfaces.mirrors[facet]
+    which, facet = which[some], facet[some]
+    some = np.ones(len(which), bool)
+    for own, other in ((last[which], facet), (facet, last[which])):  # a corner of one is in front of the other
+        height = dot3(surfaces.triangles[other] - surfaces.centers[own, None], surfaces.normals[own])
+        height = np.where(surfaces.two_sided[own, None], np.abs(height), height)
+        some &= folded(np.maximum, height) > surfaces.on_plane
+    return which[some], facet[some]
+
+
+def dot3(corners: np.ndarray, axis: np.ndarray) -> np.ndarray:
+    """Products (k, n) of corners (k, n, 3) with one vector each (k, 3)."""
+    return np.asarray(np.matmul(corners, axis[:, :, None])[..., 0])
+
+
+def extended(surfaces: Surfaces, beams: Beams, chain: np.ndarray, facet: np.ndarray) -> tuple[Beams, int]:
+    """The beams after one facet more, without shadows, for pairs (p,) of a chain and a facet; and how many pairs of a
+    beam and a facet were looked at."""
+    image = mirrored(beams.apex, beams.normals[beams.chain, -1], surfaces.centers[beams.last])
+    planes = beams.polygons.edge_planes(image)
+    n_pairs, parts = 0, []
+    number = np.diff(np.append(beams.first_of, len(beams)))[chain]
+    for pairs in in_blocks(number):
+        row, place = beams.rows_of(chain[pairs])
+        place += pairs.start
+        n_pairs += len(row)
+        target = facet[place]
+        normal, reflects = surfaces.facing(target, image[row])
+        reflects &= ~apart(surfaces.triangles[target], planes[row], beams.polygons.corners[row])
+        some = np.flatnonzero(reflects)
+        row, place, target, normal = row[some], place[some], target[some], normal[some]
+        polygons, last = Polygons.of(surfaces.triangles[target]), beams.last[row]
+        side = beams.normals[beams.chain[row], -1]
+        polygons = polygons.clipped(polygons.heights(side, surfaces.centers[last], surfaces.on_plane))
+        polygons = polygons.seen_through(planes[row], beams.polygons.corners[row], surfaces.snap)
+        some = np.flatnonzero(polygons.area > LEAST_AREA * surfaces.areas[target])
+        key = 2 * place[some] + (dot(normal[some], surfaces.normals[target[some]]) > 0)
+        parts.append((key, row[some], target[some], normal[some], polygons[some]))
+    if not parts:
+        return beams[np.zeros(0, np.int64)], n_pairs
+    key, row, target, normal = (np.concatenate([part[i] for part in parts]) for i in range(4))
+    old = beams.chain[row]
+    polygons = joined([part[4] for part in parts])
+    return _sorted(
+        key, beams.chains[old], beams.normals[old], beams.pulse[row], target, normal, image[row], polygons
+    ), n_pairs
+
+
+def in_blocks(number: np.ndarray, most: int = ROWS_AT_ONCE) -> list[slice]:
+    """Slices of a list whose entries take `number` rows each (n,), of about `most` rows."""
+    if not len(number):
+        return []
+    block = (np.cumsum(number) - number) // most
+    starts = np.flatnonzero(np.append(True, block[1:] != block[:-1])).tolist()
+    return [slice(*ends) for ends in zip(starts, [*starts[1:], len(number)], strict=True)]
+
+
+def _sorted(
+    key: np.ndarray,
+    chains: np.ndarray,
+    normals: np.ndarray,
+    pulse: np.ndarray,
+    facet: np.ndarray,
+    normal: np.ndarray,
+    apex: np.ndarray,
+    polygons: Polygons,
+) -> Beams:
+    """Beams with one facet more than `chains` (k, m), in the order of keys (k,), one for each new chain."""
+    order = np.argsort(key, kind="stable")
+    _, begin, chain = np.unique(key[order], return_index=True, return_inverse=True)
+    one = order[begin]
+    return Beams(
+        chain,
+        pulse[order],
+        np.concatenate([chains[one], facet[one, None]], axis=1),
+        np.concatenate([normals[one], normal[one, None]], axis=1),
+        apex[order],
+        polygons[order],
+    )
+
+
+def _cones(center: np.ndarray, radius: np.ndarray, image: np.ndarray, turn: float) -> Cones:
+    """Cones that hold all lines through spheres from images, m (c, 3), that turn by up to `turn`, rad, beyond these."""
+    away = center - image
+    distance = np.linalg.norm(away, axis=1)
+    sine = np.minimum(radius / distance, 1 - 1e-9)
+    widening = np.tan(np.minimum(np.arcsin(sine) + turn, MOST_ANGLE))
+    first = np.maximum(radius, distance * np.tan(np.minimum(np.arcsin(sine), MOST_ANGLE)))
+    return Cones(center, away / distance[:, None], first, widening, np.full(len(radius), np.inf))

@@ -1,0 +1,97 @@
+"""Facets that lie in cones and cylinders: spheres about neighbours, level by level."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ...base.morton import morton_order
+
+BRANCHES = 8  # spheres that the sphere above them holds
+AT_ONCE = 20_000  # cones that are looked at together
+MOST_PAIRS, PAIR_BYTES = (
+    20_000_000,
+    400.0,
+)  # pairs of a beam and a facet, and bytes that each takes while it is looked at
+
+
+@dataclass(frozen=True, eq=False)
+class Cones:
+    """Cones about axes that begin at `center`, m (k, 3), along unit vectors `axis` (k, 3).
+
+    radius  m (k,) about the centre;  widening  by which the radius grows per length of the axis (k,)
+    reach   m (k,): lengths of the axes
+    """
+
+    center: np.ndarray
+    axis: np.ndarray
+    radius: np.ndarray
+    widening: np.ndarray
+    reach: np.ndarray
+
+    def meet(self, which: np.ndarray, place: np.ndarray, size: np.ndarray) -> np.ndarray:
+        """Whether cones `which` (n,) come near spheres about places, m (n, 3), of radii `size`, m (n,)."""
+        step = place - self.center[which]
+        along = np.einsum("ij,ij->i", step, self.axis[which])
+        across = np.einsum("ij,ij->i", step, step) - along**2
+        radius = self.radius[which]
+        width = radius + size + self.widening[which] * np.maximum(along + size, 0)
+        return np.asarray((across <= width**2) & (along > -size - radius) & (along < size + self.reach[which]))
+
+
+class FacetTree:
+    """Triangles, m (k, 3, 3), that are looked up by cones."""
+
+    def __init__(self, triangles: np.ndarray) -> None:
+        self._order = morton_order(triangles.mean(axis=1)) if len(triangles) else np.zeros(0, np.int64)
+        self._triangles = triangles[self._order]
+
+    @cached_property
+    def _levels(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Centres and radii of the spheres of each level, from the triangles up."""
+        center = (self._triangles.min(axis=1) + self._triangles.max(axis=1)) / 2
+        levels = [(center, np.linalg.norm(self._triangles - center[:, None], axis=-1).max(axis=1))]
+        while len(levels[-1][0]) > BRANCHES:
+            center, radius = levels[-1]
+            starts = np.arange(0, len(center), BRANCHES)
+            low, high = np.minimum.reduceat(center, starts), np.maximum.reduceat(center, starts)
+            middle = (low + high) / 2
+            away = np.linalg.norm(center - np.repeat(middle, BRANCHES, axis=0)[: len(center)], axis=1) + radius
+            levels.append((middle, np.maximum.reduceat(away, starts)))
+        return levels
+
+    def within(self, cones: Cones) -> tuple[np.ndarray, np.ndarray]:
+        """Pairs of a cone and a triangle that may lie in it (n,), (n,), in the order of the cones; MemoryError for too
+        many."""
+        found, number = [], 0
+        for first in range(0, len(cones.radius), AT_ONCE):
+            found.append(self._some_within(cones, first))
+            number += len(found[-1][0])
+            if number > MOST_PAIRS:
+                total = number / (first + AT_ONCE) * len(cones.radius)
+                raise MemoryError(
+                    f"facets of this scene may reflect to one another in about {total:.0e} ways, which need "
+                    f"{PAIR_BYTES * total / 1e9:.0f} GB; take fewer bounces, a coarser mesh, or rough materials "
+                    "(height inf) for what need not reflect to others"
+                )
+        if not found:
+            return np.zeros(0, np.int64), np.zeros(0, np.int64)
+        which, facet = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        return which, self._order[facet]
+
+    def _some_within(self, cones: Cones, first: int) -> tuple[np.ndarray, np.ndarray]:
+        number = min(AT_ONCE, len(cones.radius) - first)
+        top = len(self._levels[-1][0])
+        which, node = np.repeat(np.arange(first, first + number), top), np.tile(np.arange(top), number)
+        for depth in range(len(self._levels) - 1, -1, -1):
+            center, radius = self._levels[depth]
+            some = cones.meet(which, center[node], radius[node])
+            which, node = which[some], node[some]
+            if depth:
+                below = len(self._levels[depth - 1][0])
+                which = np.repeat(which, BRANCHES)
+                node = (node[:, None] * BRANCHES + np.arange(BRANCHES)).ravel()
+                which, node = which[node < below], node[node < below]
+        return which, node

@@ -1,0 +1,117 @@
+"""What lies in the way of beams: shadows of all legs on the last facet, as the beams and the receiver see it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ...base.vectors import dot, unit
+from ._beams import LEAST_AREA, Beams, Surfaces, in_blocks, mirrored
+from ._facet_tree import Cones
+from ._polygons import Polygons, Shadows, less_shadows
+
+EDGE_ON = 1e-6  # sine below which an antenna that is edge-on to a facet casts no shadows on it
+
+
+def lit(surfaces: Surfaces, beams: Beams, turn: float) -> tuple[Polygons, np.ndarray]:
+    """What shadows of all legs leave of beams: convex polygons, and the beam of each, in rising order.
+
+    turn  rad: directions to two of the antennas' positions differ by no more
+    """
+    pieces, of = beams.polygons, np.arange(len(beams))
+    for leg, end, image, start in _legs(surfaces, beams):
+        chain, shapes = _between(surfaces, beams, leg, end, image, start, turn)
+        pieces, of = _less(surfaces, beams, pieces, of, beams.apex, chain, shapes)
+    return pieces, of
+
+
+def seen(
+    surfaces: Surfaces, beams: Beams, pieces: Polygons, of: np.ndarray, rx: np.ndarray, turn: float
+) -> tuple[Polygons, np.ndarray]:
+    """What receivers, m (k, 3), see of pieces of beams `of` (n,): as `lit`."""
+    if not len(beams):
+        return pieces, of
+    start = Polygons(rx[:, None], np.ones(len(rx), np.int64))
+    chain, shapes = _between(surfaces, beams, beams.order, beams.polygons, rx, start, turn, receives=True)
+    sine = dot(beams.normals[beams.chain, -1], unit(rx - surfaces.centers[beams.last]))
+    return _less(surfaces, beams, pieces, of, rx, chain, shapes, sine > EDGE_ON)
+
+
+def _less(
+    surfaces: Surfaces,
+    beams: Beams,
+    pieces: Polygons,
+    of: np.ndarray,
+    apex: np.ndarray,
+    chain: np.ndarray,
+    shapes: Polygons,
+    casts: np.ndarray | None = None,
+) -> tuple[Polygons, np.ndarray]:
+    """Pieces less the shadows of shapes, each in the way of all beams of a chain (n,); casts  of which beams (k,)."""
+    least = LEAST_AREA * surfaces.areas[beams.last]
+    has_pieces = np.bincount(of, minlength=len(beams)) > 0
+    if casts is not None:
+        has_pieces &= casts
+    falling = []
+    number = np.diff(np.append(beams.first_of, len(beams)))[chain]
+    for pairs in in_blocks(number):
+        row, place = beams.rows_of(chain[pairs])
+        some = has_pieces[row]
+        row, place = row[some], place[some] + pairs.start
+        falling.append(Shadows.falling_on(beams.polygons, apex, row, shapes[place], least, surfaces.snap))
+    if not falling:
+        return pieces, of
+    return less_shadows(pieces, of, Shadows.joined(falling), least, surfaces.snap)
+
+
+def _legs(surfaces: Surfaces, beams: Beams) -> Iterator[tuple[int, Polygons, np.ndarray, Polygons]]:
+    """Legs of the beams from the last to the first: number, polygons on the facet where each ends, the antenna's image
+    from which it comes, m (k, 3), and polygons where it begins."""
+    corners, image, m = beams.polygons.corners, beams.apex, beams.order
+    ends = [(beams.polygons, image)]
+    for leg in range(m - 1, 0, -1):
+        normal, point = beams.normals[beams.chain, leg - 1], surfaces.centers[beams.chains[beams.chain, leg - 1]]
+        corners, image = mirrored(corners, normal, point), mirrored(image, normal, point)
+        away = corners - image[:, None]
+        rise = (away * normal[:, None]).sum(axis=-1)
+        part = dot(point - image, normal)[:, None] / np.where(rise == 0, 1, rise)
+        ends.append((Polygons(image[:, None] + part[..., None] * away, beams.polygons.count), image))
+    starts = [end for end, _ in ends[1:]] + [Polygons(ends[-1][1][:, None], np.ones(len(beams), np.int64))]
+    for leg, (end, image), start in zip(range(m, 0, -1), ends, starts, strict=True):
+        yield leg, end, image, start
+
+
+def _between(
+    surfaces: Surfaces,
+    beams: Beams,
+    leg: int,
+    end: Polygons,
+    image: np.ndarray,
+    start: Polygons,
+    turn: float,
+    *,
+    receives: bool = False,
+) -> tuple[np.ndarray, Polygons]:
+    """What may lie in the way of a leg of the beams of each chain: numbers of chains (n,), and polygons, mirrored to
+    where they shade the last facet. receives  the leg is that to a receiver."""
+    if not len(beams):
+        return np.zeros(0, np.int64), Polygons(np.zeros((0, 3, 3)), np.zeros(0, np.int64))
+    center, radius = beams.bounds(end)
+    toward = image[beams.first_of] - center
+    length = np.maximum.reduceat(np.linalg.norm(end.center - start.center, axis=1), beams.first_of)
+    length = length + radius + beams.bounds(start)[1]
+    cones = Cones(center, unit(toward), radius, np.full(len(radius), np.tan(min(2 * turn, 1.5))), length)
+    chain, occluder = surfaces.tree.within(cones)
+    facets = beams.chains[:, leg - 1 : leg] if leg == 1 or receives else beams.chains[:, leg - 2 : leg]
+    some = np.flatnonzero((occluder[:, None] != facets[chain]).all(axis=1))
+    chain, shapes = chain[some], Polygons.of(surfaces.triangles[occluder[some]])
+    for number in range(leg, leg - facets.shape[1], -1):  # in front of the facets where the leg ends and begins
+        normal, point = beams.normals[chain, number - 1], surfaces.centers[beams.chains[chain, number - 1]]
+        height = shapes.heights(normal, point, surfaces.on_plane)
+        some = np.flatnonzero(height.max(axis=1, initial=-np.inf) > 0)
+        chain, shapes = chain[some], shapes[some].clipped(height[some])
+    for number in range(leg, beams.order):
+        normal, point = beams.normals[chain, number - 1], surfaces.centers[beams.chains[chain, number - 1]]
+        shapes = Polygons(mirrored(shapes.corners, normal, point), shapes.count)
+    return chain, shapes

@@ -1,0 +1,222 @@
+"""Convex polygons in space, many at a time: clipping by planes, areas, and what shadows leave of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...base.vectors import cross
+
+SHORT = 1e-9  # of a polygon's longest edge: shorter ones are rounding, and have no direction
+MOST_PIECES = 4_000_000  # polygons that shadows may leave: about 1 GB
+
+
+@dataclass(frozen=True, eq=False)
+class Polygons:
+    """Convex polygons: corners m (k, n, 3), of which the first `count` (k,) count; the others repeat the first."""
+
+    corners: np.ndarray
+    count: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.count)
+
+    @classmethod
+    def of(cls, corners: np.ndarray) -> Polygons:
+        """Polygons of n corners each, m (k, n, 3)."""
+        return cls(corners, np.full(len(corners), corners.shape[1]))
+
+    def __getitem__(self, some: np.ndarray) -> Polygons:
+        return Polygons(self.corners[some], self.count[some])
+
+    @property
+    def valid(self) -> np.ndarray:
+        """Corners that count (k, n) bool."""
+        return np.arange(self.corners.shape[1]) < self.count[:, None]
+
+    @property
+    def area(self) -> np.ndarray:
+        """Areas, m^2 (k,)."""
+        spokes = self.corners[:, 1:] - self.corners[:, :1]
+        twice = folded(np.add, cross(spokes[:, :-1], spokes[:, 1:]).swapaxes(1, 2))
+        return np.asarray(np.where(self.count > 2, np.sqrt(folded(np.add, twice**2)) / 2, 0.0))
+
+    @property
+    def center(self) -> np.ndarray:
+        """Means of the corners, m (k, 3)."""
+        total = folded(np.add, self.corners.swapaxes(1, 2))
+        padding = self.corners.shape[1] - self.count
+        return np.asarray((total - padding[:, None] * self.corners[:, 0]) / np.maximum(self.count, 1)[:, None])
+
+    def heights(self, normal: np.ndarray, point: np.ndarray, snap: float) -> np.ndarray:
+        """Heights of the corners over planes, m (k, n): 0 where they are at most `snap`; normal, point (k, 3)."""
+        height = np.matmul(self.corners - point[:, None], normal[:, :, None])[..., 0]
+        return np.where(np.abs(height) <= snap, 0.0, height)
+
+    def clipped(self, height: np.ndarray) -> Polygons:
+        """The parts of which the height, (k, n) at the corners, is at least 0."""
+        outside = folded(np.minimum, height) < 0  # padding repeats a corner
+        rows = np.flatnonzero(outside)
+        count = np.where(outside, 0, self.count)
+        if not len(rows):
+            return self
+        corners, height, valid = self.corners[rows], height[rows], self.valid[rows]
+        after, height_after = np.roll(corners, -1, axis=1), np.roll(height, -1, axis=1)
+        crosses = valid & (height * height_after < 0)
+        part = height / np.where(crosses, height - height_after, 1)
+        met = corners + part[..., None] * (after - corners)
+        both = np.stack([corners, met], axis=2).reshape(len(rows), -1, 3)
+        keep = np.stack([(height >= 0) & valid, crosses], axis=2).reshape(len(rows), -1)
+        number = folded(np.add, keep.astype(np.int64))
+        number[number < 3] = 0
+        keep &= number[:, None] > 0
+        size = max(int(number.max(initial=0)), int(count.max(initial=0)), 3)
+        out = np.repeat(self.corners[:, :1], size, axis=1)
+        n = min(size, self.corners.shape[1])
+        out[:, :n] = self.corners[:, :n]
+        out[rows] = both[np.arange(len(rows)), keep.argmax(axis=1)][:, None]
+        row, column = np.nonzero(keep)
+        out[rows[row], (np.cumsum(keep, axis=1) - 1)[row, column]] = both[row, column]
+        count[rows] = number
+        return Polygons(out, count)
+
+    def edge_planes(self, apex: np.ndarray) -> np.ndarray:
+        """Unit normals (k, n, 3) of planes through each edge and an apex, m (k, 3), that point inwards; 0 for edges
+        without a direction. A plane holds the corner at which its edge begins."""
+        along = np.roll(self.corners, -1, axis=1) - self.corners
+        normal = cross(self.corners - apex[:, None], along)
+        length, size = (np.sqrt(folded(np.add, vectors**2)) for vectors in (along, normal))
+        inwards = np.sign(folded(np.add, normal * (self.center[:, None] - self.corners)))
+        is_edge = (length > SHORT * folded(np.maximum, length)[:, None]) & (size > 0)
+        return np.where(is_edge[..., None], normal * (inwards / np.where(is_edge, size, 1))[..., None], 0.0)
+
+    def seen_through(self, planes: np.ndarray, corners: np.ndarray, snap: float) -> Polygons:
+        """The parts (k) inside windows: `edge_planes` of these (k, m, 3), and their corners, m (k, m, 3)."""
+        out = self
+        for edge in range(planes.shape[1]):
+            out = out.clipped(out.heights(planes[:, edge], corners[:, edge], snap))
+        return out
+
+    @property
+    def spheres(self) -> tuple[np.ndarray, np.ndarray]:
+        """Centres, m (k, 3), and radii, m (k,), of spheres about the polygons."""
+        low, high = self.corners.min(axis=1), self.corners.max(axis=1)
+        return (low + high) / 2, np.linalg.norm(high - low, axis=1) / 2
+
+
+def apart(corners: np.ndarray, planes: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Whether polygons with corners m (k, n, 3) lie outside one of the planes (k, m, 3) through points, m (k, m, 3)."""
+    heights = np.matmul(planes, corners.swapaxes(1, 2))
+    base = planes[..., 0] * points[..., 0] + planes[..., 1] * points[..., 1] + planes[..., 2] * points[..., 2]
+    return folded(np.logical_or, folded(np.maximum, heights) < base)
+
+
+def folded(function: np.ufunc, values: np.ndarray) -> np.ndarray:
+    """`function` over the last axis of values (..., n): NumPy's own takes ten times as long along an axis so short."""
+    out = values[..., 0].copy()
+    for i in range(1, values.shape[-1]):
+        function(out, values[..., i], out=out)
+    return np.asarray(out)
+
+
+def joined(parts: list[Polygons]) -> Polygons:
+    """Polygons one after the other."""
+    size = max(part.corners.shape[1] for part in parts)
+    padded = [
+        np.concatenate([p.corners, np.repeat(p.corners[:, :1], size - p.corners.shape[1], axis=1)], axis=1)
+        for p in parts
+    ]
+    return Polygons(np.concatenate(padded), np.concatenate([part.count for part in parts]))
+
+
+@dataclass(frozen=True, eq=False)
+class Shadows:
+    """Occluders before the polygons `of` (n,) on which their shadows may fall: their corners, and planes through their
+    edges and the place from where the shadows fall, as of `edge_planes`, (n, m, 3) each."""
+
+    of: np.ndarray
+    corners: np.ndarray
+    planes: np.ndarray
+
+    def __getitem__(self, some: np.ndarray) -> Shadows:
+        return Shadows(self.of[some], self.corners[some], self.planes[some])
+
+    @classmethod
+    def joined(cls, parts: list[Shadows]) -> Shadows:
+        """Shadows one after the other."""
+        size = max(part.corners.shape[1] for part in parts)
+        corners = [np.pad(part.corners, ((0, 0), (0, size - part.corners.shape[1]), (0, 0))) for part in parts]
+        planes = [np.pad(part.planes, ((0, 0), (0, size - part.planes.shape[1]), (0, 0))) for part in parts]
+        return cls(np.concatenate([part.of for part in parts]), np.concatenate(corners), np.concatenate(planes))
+
+    @classmethod
+    def falling_on(
+        cls, polygons: Polygons, apex: np.ndarray, of: np.ndarray, occluders: Polygons, least: np.ndarray, snap: float
+    ) -> Shadows:
+        """Those of occluders (n,) whose shadows from an apex, m (k, 3), on polygons `of` (n,) are larger than `least`,
+        m^2 (k,); the largest first, since nothing is left to cut where they cover all."""
+        if not len(of):
+            return cls(of, occluders.corners, occluders.corners)
+        planes = polygons.edge_planes(apex)
+        some = np.flatnonzero(~apart(occluders.corners, planes[of], polygons.corners[of]))
+        of, occluders = of[some], occluders[some]
+        away = polygons.center[of] - apex[of]  # nothing behind the apex casts a shadow
+        front = occluders.clipped(occluders.heights(away, apex[of] + 1e-9 * away, 0.0))
+        some = np.flatnonzero(front.count > 0)
+        of, occluders = of[some], front[some]
+        planes = occluders.edge_planes(apex[of])
+        some = np.flatnonzero(~apart(polygons.corners[of], planes, occluders.corners))
+        out = cls(of[some], occluders.corners[some], planes[some])
+        area = polygons[out.of].seen_through(out.planes, out.corners, snap).area
+        some = np.flatnonzero(area > least[out.of])
+        return out[some[np.argsort(-area[some])]]
+
+
+def less_shadows(
+    pieces: Polygons, of: np.ndarray, shadows: Shadows, least: np.ndarray, snap: float
+) -> tuple[Polygons, np.ndarray]:
+    """Convex polygons that together are pieces of polygons `of` (n,) less their shadows; and of which each is a piece,
+    in rising order.
+
+    least  m^2, of each polygon: smaller pieces are left out
+    """
+    shadows = shadows[np.argsort(shadows.of, kind="stable")]
+    number = np.bincount(shadows.of, minlength=len(least))
+    first = np.cumsum(number) - number
+    done: list[tuple[Polygons, np.ndarray]] = []
+    for turn in range(int(number.max(initial=0))):
+        over = number[of] <= turn
+        done.append((pieces[over], of[over]))
+        pieces, of = pieces[~over], of[~over]
+        pieces, of = _cut_once(pieces, of, shadows[first[of] + turn], least, snap)
+        if len(of) > MOST_PIECES:
+            raise MemoryError(
+                f"shadows cut what facets reflect to one another into more than {MOST_PIECES:,} parts at a time; take "
+                "fewer bounces or a coarser mesh"
+            )
+    done.append((pieces, of))
+    of = np.concatenate([owners for _, owners in done])
+    order = np.argsort(of, kind="stable")
+    return joined([part for part, _ in done])[order], of[order]
+
+
+def _cut_once(
+    pieces: Polygons, of: np.ndarray, shadows: Shadows, least: np.ndarray, snap: float
+) -> tuple[Polygons, np.ndarray]:
+    """Pieces less one shadow each."""
+    shaded = ~apart(pieces.corners, shadows.planes, shadows.corners)
+    parts, owners = [pieces[~shaded]], [of[~shaded]]
+    inner, of, shadows = pieces[shaded], of[shaded], shadows[shaded]
+    uncut, outer = inner, []
+    for edge in range(shadows.planes.shape[1]):
+        is_edge = folded(np.logical_or, shadows.planes[:, edge] != 0)
+        height = inner.heights(shadows.planes[:, edge], shadows.corners[:, edge], snap)
+        outer.append(inner.clipped(np.where(is_edge[:, None], -height, -1.0)))
+        inner = inner.clipped(height)
+    falls = inner.area > least[of]
+    for part, counts in [*((part, falls) for part in outer), (uncut, ~falls)]:
+        some = np.flatnonzero(counts & (part.area > least[of]))
+        parts.append(part[some])
+        owners.append(of[some])
+    return joined(parts), np.concatenate(owners)

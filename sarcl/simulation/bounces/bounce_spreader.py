@@ -1,0 +1,218 @@
+"""Echoes of beams that two facets or more reflect one after the other, added to samples on the host in float64."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ...base.boxes import box
+from ...base.constants import SPEED_OF_LIGHT
+from ...base.stage_timer import Clock
+from ...numerics.polynomials import chebyshev, lagrange
+from ...scene.scene import Scene
+from ...scene.triangles import bisect, edges, solid
+from ..spreading import ChannelView, Counts
+from . import _beams, _occlusion, _sums
+from ._amplitudes import Coatings, Facets
+from ._beams import Beams, Surfaces
+from ._polygons import Polygons
+
+PULSES_AT_ONCE, BEAMS_AT_ONCE = 128, 60_000  # pulses of a block, and pairs of these and facets that reflect to others
+MOST_TURN = 0.05  # rad, by which directions to antennas differ within a block
+CURVATURE = 1.0  # rad over the tolerance: phase of the wave's curvature over a triangle
+DIRECTION = 0.5  # rad over the root of the tolerance: by which directions change over a triangle
+PROFILES = 1 / 300  # of the tolerance: error of sums over frequencies
+NODES = 6  # frequencies at which matrices of dispersive materials are computed
+
+
+@dataclass(frozen=True, eq=False)
+class BounceScene:
+    """Facets of a scene that reflect to one another, about `origin`, m (3,).
+
+    bounces    of the last order that is followed;  tolerance  relative to the bounced echoes at random phases
+    """
+
+    surfaces: Surfaces
+    coatings: Coatings
+    origin: np.ndarray
+    bounces: int
+    tolerance: float
+
+    @classmethod
+    def of(cls, scene: Scene, bounces: int, tolerance: float) -> BounceScene | None:
+        """The facets of a scene, None where no two of them reflect."""
+        some = np.flatnonzero(solid(scene.triangles)) if len(scene.triangles) else np.zeros(0, np.int64)
+        triangles, material = scene.triangles[some], scene.material[some]
+        fine = np.array([m.height for m in scene.materials])[material]
+        reflectivity = scene.reflectivity[some]
+        mirrors = np.isfinite(fine) & (reflectivity != 0)
+        if bounces == 1 or mirrors.sum() < 2:
+            return None
+        origin = box(triangles.reshape(-1, 3)).mean(axis=0)
+        height = np.hypot(np.where(mirrors, fine, 0.0), scene.roughness[some])
+        coatings = Coatings(material, scene.materials, reflectivity, height)
+        return cls(Surfaces(triangles - origin, scene.two_sided[some], mirrors), coatings, origin, bounces, tolerance)
+
+    @cached_property
+    def mirrors(self) -> np.ndarray:
+        """Numbers of the facets that reflect."""
+        return np.flatnonzero(self.surfaces.mirrors)
+
+
+class BounceSpreader:
+    """Adds the echoes of 2 ... n reflections in a channel: the part of each beam that lights a facet and that the
+    receiver sees, by physical optics on that facet.
+
+    predicted_error  relative to these echoes at random phases
+    """
+
+    def __init__(self, scene: BounceScene, view: ChannelView) -> None:
+        self.scene, self.view = scene, view
+        self.predicted_error = scene.tolerance
+
+    def describe(self) -> dict[str, Any]:
+        """Words and numbers for a report."""
+        return {"bounces": self.scene.bounces}
+
+    def add(
+        self, samples: np.ndarray, pulses: Sequence[int], clock: Clock, on_progress: Callable[[int], object]
+    ) -> Counts:
+        """Add to samples (n_pulses, n_polarizations, n_samples) of consecutive `pulses` of the antennas."""
+        clock.lap("echo")
+        counts, numbers = Counts(), np.asarray(pulses)
+        for rows in self._blocks(numbers):
+            values, part = self.values(numbers[rows], self.view.frequencies)
+            samples[rows] += values.astype(np.complex64)
+            counts += part
+            on_progress(counts.pairs)
+        clock.lap("bounces")
+        return counts
+
+    def _blocks(self, pulses: np.ndarray) -> Iterator[slice]:
+        """Slices of pulses that are looked at together: antennas turn little within each."""
+        tx, rx = (end[pulses] - self.scene.origin for end in (self.view.antennas.tx, self.view.antennas.rx))
+        first = 0
+        while first < len(pulses):
+            number = min(PULSES_AT_ONCE, len(pulses) - first)
+            while number > 1 and max(self._turn(end[first : first + number]) for end in (tx, rx)) > MOST_TURN:
+                number = -(-number // 2)
+            yield slice(first, first + number)
+            first += number
+
+    def values(self, pulses: np.ndarray, frequencies: np.ndarray, *, exact: bool = False) -> tuple[np.ndarray, Counts]:
+        """Echoes of pulses (n,) at frequencies, Hz, complex128 (n, n_polarizations, n_f); exact: added one by one."""
+        out = np.zeros((len(pulses), len(self.view.polarizations), len(frequencies)), np.complex128)
+        counts, origin, surfaces = Counts(), self.scene.origin, self.scene.surfaces
+        tx, rx = (end[pulses] - origin for end in (self.view.antennas.tx, self.view.antennas.rx))
+        turn = max(self._turn(tx), self._turn(rx))
+        facets = _beams.first_facets(surfaces, tx, turn)
+        half = len(pulses) // 2
+        if len(facets) * len(pulses) > BEAMS_AT_ONCE and half:
+            (a, counts), (b, more) = (self.values(p, frequencies, exact=exact) for p in (pulses[:half], pulses[half:]))
+            return np.concatenate([a, b]), counts + more
+        for beams, pieces, of, n_pairs in self._lit_beams(_beams.first(surfaces, tx, facets), rx, turn):
+            outside, seen = 0, np.bincount(of, minlength=len(beams)) > 0
+            if len(of):
+                triangles = self._facets(beams, pieces, of, rx)
+                inside = self._inside(triangles, pulses)
+                outside = int(seen.sum()) - len(np.unique(triangles.of[inside]))
+                self._add(out, pulses, frequencies, triangles.chosen(inside), exact)
+            done = int(seen.sum()) - outside
+            counts += Counts(
+                n_pairs, outside, unseen=n_pairs - outside - done, orders=(0,) * (beams.order - 1) + (done,)
+            )
+        return out, counts
+
+    def _lit_beams(
+        self, beams: Beams, rx: np.ndarray, turn: float
+    ) -> Iterator[tuple[Beams, Polygons, np.ndarray, int]]:
+        """Beams of each order from 2 on, their pulses counted from 0, what receivers, m (n, 3), see of them, the beam
+        of each piece, and the number of pairs of beam and facet that were looked at; beams  of the first order."""
+        surfaces = self.scene.surfaces
+        for _ in range(self.scene.bounces - 1):
+            if not len(beams):
+                return
+            beams, n_pairs = _beams.extended(surfaces, beams, *_beams.reached(surfaces, beams, turn))
+            pieces, of = _occlusion.lit(surfaces, beams, turn)
+            arrives = np.bincount(of, minlength=len(beams)) > 0
+            beams, of = beams[np.flatnonzero(arrives)], (np.cumsum(arrives) - 1)[of]
+            yield beams, *_occlusion.seen(surfaces, beams, pieces, of, rx[beams.pulse], turn), n_pairs
+
+    def _turn(self, antennas: np.ndarray) -> float:
+        """Angle, rad, by which directions from any facet to antennas, m (n, 3), differ from those to the middle one."""
+        low, high = box(self.scene.surfaces.triangles.reshape(-1, 3))
+        middle = antennas[len(antennas) // 2]
+        step = float(np.linalg.norm(antennas - middle, axis=1).max())
+        if not step:
+            return 0.0
+        distance = float(np.linalg.norm(antennas - np.clip(antennas, low, high), axis=1).min())
+        return float(2 * np.arcsin(min(1.0, step / (2 * distance)))) if distance else float(np.pi)
+
+    def _facets(self, beams: Beams, pieces: Polygons, of: np.ndarray, rx: np.ndarray) -> Facets:
+        """Triangles that are together the pieces of beams, small enough for plane waves."""
+        corners = pieces.corners
+        fans = [(i, np.flatnonzero(pieces.count > i + 1)) for i in range(1, corners.shape[1] - 1)]
+        triangles = np.concatenate([corners[some][:, [0, i, i + 1]] for i, some in fans])
+        of = np.concatenate([of[some] for _, some in fans])
+        wave = 2 * np.pi * float(self.view.frequencies[-1]) / SPEED_OF_LIGHT
+        parts, numbers = [], []
+        while len(triangles):
+            center = triangles.mean(axis=1)
+            radius = np.linalg.norm(triangles - center[:, None], axis=-1).max(axis=1)
+            bend = sum(1 / np.linalg.norm(end[of] - center, axis=1) for end in (beams.apex, rx[beams.pulse]))
+            long = wave / 2 * radius**2 * bend > CURVATURE * self.scene.tolerance
+            long |= radius * bend > DIRECTION * np.sqrt(self.scene.tolerance)
+            parts.append(triangles[~long])
+            numbers.append(of[~long])
+            triangles, of = (
+                np.concatenate(bisect(triangles[long], np.asarray(edges(triangles[long])))),
+                np.tile(of[long], 2),
+            )
+        of = np.concatenate(numbers)
+        return Facets(np.concatenate(parts), beams[of], rx[beams.pulse[of]], of)
+
+    def _inside(self, facets: Facets, pulses: np.ndarray) -> np.ndarray:
+        """Numbers of the triangles inside the range window."""
+        if not self.view.gated:
+            return np.arange(len(facets))
+        antennas, row = self.view.antennas, pulses[facets.beams.pulse]
+        delta = facets.path / 2 - antennas.reference_range[row]
+        return np.flatnonzero((delta >= antennas.near[row]) & (delta <= antennas.far[row]))
+
+    def _add(self, out: np.ndarray, pulses: np.ndarray, frequencies: np.ndarray, facets: Facets, exact: bool) -> None:
+        view, scene = self.view, self.scene
+        row = facets.beams.pulse
+        delay = (facets.path - 2 * view.antennas.reference_range[pulses[row]]) / SPEED_OF_LIGHT
+        band = np.array([frequencies.min(), frequencies.max()])
+        varies = scene.coatings.disperses or view.weights.varies_over_band
+        at = chebyshev(band.mean(), float(np.ptp(band)), NODES) if varies and np.ptp(band) else band[:1]
+        matrices = np.stack([self._weighted(facets, pulses, float(f)) for f in at], axis=1)
+
+        def amplitudes(some: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+            basis = lagrange(at, wanted)
+            shapes = facets.chosen(some).shapes(wanted, scene.coatings)
+            return np.asarray(shapes[:, :, None] * np.einsum("nmj,mf->nfj", matrices[some], basis))
+
+        error = PROFILES * scene.tolerance
+        extra = 1 + (NODES - 1) * varies + 4 * bool(scene.coatings.height.any())
+        nodes = _sums.nodes_for(np.pi * float(np.ptp(band)) / SPEED_OF_LIGHT * facets.widest, error, extra)
+        if exact:  # at any frequencies
+            nodes = np.full(len(nodes), len(frequencies))
+        _sums.add(out, frequencies, _sums.Delays(row, delay), amplitudes, nodes, error)
+
+    def _weighted(self, facets: Facets, pulses: np.ndarray, frequency: float) -> np.ndarray:
+        """Matrices of triangles times the weights of the antennas, complex128 (n, n_polarizations)."""
+        view, beams = self.view, facets.beams
+        out = facets.matrices(frequency, self.scene.coatings, view.polarizations, view.vertical)
+        if not view.weights.is_needed:
+            return out
+        leaving = facets.rays()[0] * np.linalg.norm(facets.center - beams.apex, axis=1)[:, None]
+        for row in np.unique(beams.pulse).tolist():
+            some = np.flatnonzero(beams.pulse == row)
+            ways = leaving[some], (facets.center - facets.rx)[some]
+            out[some] *= view.weights.of_paths(*ways, int(pulses[row]), frequency)[:, None]
+        return out

@@ -1,0 +1,111 @@
+"""bounces= of the verbs: what it takes and refuses, and what a report says of it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import sarcl
+from sarcl.base.errors import NotApplicable
+
+CHIRP = sarcl.Waveform.chirp(center=9.6e9, bandwidth=50e6, duration=1e-6)
+TRACK = sarcl.Trajectory.line(start=(1e3, 998, 1e3), velocity=(0, 1, 0), prf=1.0, n_pulses=4)
+CORNER = np.array(
+    [[(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 0, 0), (0, 1, 0), (0, 0, 1)], [(0, 0, 0), (0, 0, 1), (1, 0, 0)]], float
+)
+SCENE = sarcl.Scene.facets(CORNER)
+
+
+def echo(scene: sarcl.Scene = SCENE, **options: object) -> sarcl.PhaseHistory:
+    return sarcl.echo(scene, CHIRP, TRACK, **({"bounces": 3, "tolerance": 1e-2, "check": False} | options))
+
+
+@pytest.mark.parametrize("bounces", [0, 9, -1])
+def test_other_numbers_of_reflections_are_refused(bounces):
+    with pytest.raises(ValueError, match="bounces"):
+        echo(bounces=bounces)
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({"shadows": False}, "shadows=True"),
+        ({"array": sarcl.AntennaArray.linear(2, spacing=0.1, frequency_step=0.0)}, "array"),
+    ],
+)
+def test_what_does_not_go_with_several_reflections_is_refused_by_name(options, text):
+    with pytest.raises(ValueError, match=rf"bounces is 3.*{text}"):
+        echo(**options)
+
+
+def test_spectral_echo_and_fullwave_echo_refuse_bounces():
+    with pytest.raises(NotApplicable, match=r"bounces is 2.*echo"):
+        sarcl.spectral_echo(SCENE, CHIRP, TRACK, bounces=2)
+    with pytest.raises(TypeError, match="bounces"):
+        sarcl.fullwave_echo(SCENE, CHIRP, TRACK, bounces=2)
+
+
+def test_a_report_counts_contributions_by_reflections_and_has_their_error():
+    report = echo().report
+    assert "up to 3 reflections" in str(report.plan["model"])
+    counts = dict(part.split(": ") for part in str(report.plan["contributions by reflections"]).split(", "))
+    assert list(counts) == ["1", "2", "3"]
+    assert int(counts["2"]) == int(counts["3"]) == 6 * len(TRACK)  # every order of the three plates
+    assert report.contributions_done == sum(map(int, counts.values()))
+    assert report.contributions_skipped["no reflection from facet to facet"] >= 0
+    assert "bounces" in {term.name for term in report.error_terms}
+    assert "contributions by reflections" not in echo(bounces=1).report.plan
+
+
+def test_a_forecast_has_the_error_and_samples_of_the_run():
+    forecast = sarcl.plan(sarcl.echo, SCENE, CHIRP, TRACK, bounces=3, tolerance=1e-2)
+    raw = forecast.run()
+    assert raw.report.predicted_error <= forecast.predicted_error * (1 + 1e-9)
+    assert np.array_equal(raw.samples, echo().samples)
+
+
+def test_blocks_and_pieces_of_the_track_have_the_same_samples():
+    raw = echo()
+    single = [
+        sarcl.echo(
+            SCENE, CHIRP, sarcl.Trajectory(None, TRACK.positions[[p]]), bounces=3, tolerance=1e-2, check=False,
+            reference=(0.5, 0.5, 0.5), range_window=(-5, 5),
+        ).samples[0]
+        for p in range(len(TRACK))
+    ]  # fmt: skip
+    whole = echo(reference=(0.5, 0.5, 0.5), range_window=(-5, 5)).samples
+    assert np.abs(whole - np.array(single)).max() <= 2e-3 * np.abs(whole).max()
+    assert np.isfinite(raw.samples).all()
+
+
+def test_echoes_outside_the_range_window_are_left_out_and_counted():
+    far = np.array([[(0, 0, 0), (30, 0, 0), (0, 30, 0)], [(0, 0, 0), (0, 30, 0), (0, 0, 30)]], float)
+    scene = sarcl.Scene.facets(far)
+    whole, part = (echo(scene, bounces=2, reference=(30, 30, 0), range_window=(-w, w)) for w in (60, 20))
+    assert whole.report.contributions_skipped["range window"] == 0
+    assert part.report.contributions_skipped["range window"] > 0
+
+
+def test_facets_without_coherent_part_shade_and_do_not_reflect_to_others():
+    diffuse = sarcl.Scene.facets(CORNER, material=[0, 1, 1], materials=["metal", sarcl.Material(diagram="isotropic")])
+    one, three = (echo(diffuse, bounces=n).samples for n in (1, 3))
+    assert np.linalg.norm(three - one) <= 2e-2 * np.linalg.norm(one)
+
+
+def test_gains_are_those_of_the_ways_out_and_back():
+    """A wide beam on the corner weighs all ways alike; a radar's amplitudes fall with both lengths of the way."""
+    aimed = sarcl.pointing.spotlight(TRACK, (0.3, 0.3, 0.3))
+    antenna, radar = sarcl.Antenna.gaussian(width=(0.5, 0.5)), sarcl.Radar(power=1.0)
+    plain = echo().samples
+    options = {"bounces": 3, "tolerance": 1e-3, "check": False}
+    weighted = sarcl.echo(SCENE, CHIRP, aimed, antenna=antenna, **options).samples
+    assert np.linalg.norm(weighted - plain) < 1e-2 * np.linalg.norm(plain)
+    several, single = (
+        sarcl.echo(SCENE, CHIRP, aimed, antenna=antenna, radar=radar, **(options | {"bounces": n})).samples
+        for n in (3, 1)
+    )
+    one = echo(bounces=1, tolerance=1e-3).samples
+    ratio = np.vdot(plain - one, several - single) / np.vdot(plain - one, plain - one)
+    distance = np.linalg.norm(TRACK.positions - 0.0, axis=1).mean()
+    factor = radar.factor(np.array([9.6e9]))[0] / distance**2
+    assert np.isclose(ratio, factor, rtol=2e-2)
