@@ -303,7 +303,7 @@ def test_only_slopes_that_face_away_from_an_antenna_shade_a_terrain(device, bist
     for shares in (of_ground, of_house):
         assert ((shares > 0.01) & (shares < 0.99)).any()
     rows = np.flatnonzero(on_ground[parts.partly])
-    occluders = np.concatenate([parts.occluders_at(1, row) for row in rows])
+    occluders = np.concatenate([parts.occluders_at(1, row)[0] for row in rows])
     slopes = occluders[(occluders[:, None] == hills).all(axis=(2, 3)).any(axis=1)]
     cosines = [(unit(end[1] - slopes[:, 0]) * normals(slopes)).sum(axis=1) for end in ends]
     assert len(slopes) > 20 and np.min(cosines, axis=0).max() < 0.1
