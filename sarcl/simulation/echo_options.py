@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Literal
 
 from ..base.options import option
-from ..base.validation import choice, flag, number
+from ..base.validation import choice, flag
 from ..blocks.block_options import BlockOptions
 from ..numerics import plan
+from .reflection_options import EdgeOptions
 from .scene_options import FORWARD, SceneOptions
 
 Skip = Literal[
@@ -22,15 +22,8 @@ RECEIVE = ("reference", "own", "all")
 SKIPS = ("zero reflectivity", "facing away", "range window", "out of beam", "equal channels", "interpolated channels")
 
 
-def _crease(name: str, asked: object) -> float:
-    angle = number(name, asked, above=0)
-    if angle > math.pi:
-        raise ValueError(f"{name} is {angle:g} rad; normals differ by pi at most. Did you give degrees?")
-    return angle
-
-
 @dataclass(frozen=True, eq=False, kw_only=True)
-class EchoOptions(SceneOptions, BlockOptions):
+class EchoOptions(EdgeOptions, SceneOptions, BlockOptions):
     """Options of `echo`."""
 
     method: Literal["auto", "direct", "factorized"] = option(
@@ -39,16 +32,6 @@ class EchoOptions(SceneOptions, BlockOptions):
         "antenna positions about small cells, which are joined level by level; what changes too fast along the "
         'track directly; "auto": the cheapest',
         lambda name, value: choice(name, value, METHODS),
-    )
-    edges: bool = option(
-        False,
-        "True: edges of smooth perfect conductors diffract too (docs/theory/edges.md)",
-        flag,
-    )
-    crease: float = option(
-        0.35,
-        "rad: facets whose normals differ by less are parts of one smooth surface, without an edge between them",
-        _crease,
     )
     forward: bool = option(False, FORWARD + ". For coherent surfaces, and not with an array; sums are in float64", flag)
     channels: Literal["simultaneous", "separated"] = option(

@@ -85,13 +85,13 @@ class EchoRequest:
             budget=budget(device, most),
             host=max(LEAST_HOST, HOST_SHARE * host_memory.installed() if most is None else most),
             skips=set(options.skip) if not isinstance(options.skip, bool) else set(),
+            bounces=options.bounces,
             polarizations=tuple(options.polarization),
             vertical=options.vertical_at(scene.center),
             max_edge=options.max_edge,
             shadows=options.shadows,
             seed=options.seed,
             progress=options.progress,
-            bounces=options.bounces,
         )
 
     def __getstate__(self) -> dict[str, Any]:

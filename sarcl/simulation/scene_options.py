@@ -11,6 +11,7 @@ from ..base.validation import choice, count, flag, instance, number
 from ..model.antenna import Antenna
 from ..model.antenna_array import AntennaArray
 from ..model.radar import Radar
+from .reflection_options import BounceOptions
 from .track_options import TrackOptions
 
 FORWARD = (
@@ -18,7 +19,6 @@ FORWARD = (
     "shadow too; other bodies still block both ways. False: to a receiver in front of a facet alone, which holds for "
     "bistatic angles up to about 90 deg. Of no effect for one antenna"
 )
-MOST_BOUNCES = 8
 
 
 def _shadows(name: str, asked: object) -> bool:
@@ -27,13 +27,6 @@ def _shadows(name: str, asked: object) -> bool:
             "shadows is 'embree'; rays of Embree were taken out, since sarcl's own became faster and exact: give True"
         )
     return flag(name, asked)
-
-
-def _bounces(name: str, asked: object) -> int:
-    bounces = count(name, asked, 1)
-    if bounces > MOST_BOUNCES:
-        raise ValueError(f"{name} is {bounces}; give 1 to {MOST_BOUNCES} reflections")
-    return bounces
 
 
 def _max_edge(name: str, asked: object) -> float | str | None:
@@ -49,7 +42,7 @@ def antenna_array(name: str, value: Any) -> AntennaArray:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class SceneOptions(TrackOptions):
+class SceneOptions(BounceOptions, TrackOptions):
     """Options of every verb that computes echoes of points and facets."""
 
     array: AntennaArray | None = option(
@@ -74,12 +67,6 @@ class SceneOptions(TrackOptions):
         "True: of every facet only the part counts that both antennas see at each pulse (docs/theory/shadows.md; "
         "points are always seen)",
         _shadows,
-    )
-    bounces: int = option(
-        1,
-        "1 to 8: reflections that are followed from facet to facet, conductors and dielectrics alike; the last one is "
-        "that of physical optics. Parts without coherent reflection are seen once (docs/theory/bounces.md)",
-        _bounces,
     )
     seed: int = option(
         0,

@@ -38,21 +38,21 @@ class EchoKeywords(TypedDict, total=False):
     """Options of `echo`, for functions that hand them on."""
 
     method: Literal["auto", "direct", "factorized"]
-    edges: bool
-    crease: float
     forward: bool
     channels: Literal["simultaneous", "separated"]
     receive: Literal["reference", "own", "all"]
     skip: bool | Collection[EchoSkip]
+    edges: bool
+    crease: float
     array: AntennaArray | None
     antenna: Antenna | tuple[Antenna, Antenna] | None
     radar: Radar | None
     shadows: bool
-    bounces: int
     seed: int
     max_edge: float | Literal["auto"] | None
     max_bytes: float | None
     check: bool | None
+    bounces: int
     receiver: Trajectory | None
     polarization: Polarization | Literal["all"] | Sequence[Polarization]
     vertical: ArrayLike | None
@@ -181,6 +181,9 @@ class RcsKeywords(TypedDict, total=False):
     forward: bool
     shadows: bool
     check: bool | None
+    bounces: int
+    edges: bool
+    crease: float
     tolerance: float
     max_bytes: float | None
     device: DeviceChoice | None
@@ -193,21 +196,21 @@ def echo(
     track: Trajectory,
     *,
     method: Literal["auto", "direct", "factorized"] = "auto",
-    edges: bool = False,
-    crease: float = 0.35,
     forward: bool = False,
     channels: Literal["simultaneous", "separated"] = "simultaneous",
     receive: Literal["reference", "own", "all"] = "reference",
     skip: bool | Collection[EchoSkip] = True,
+    edges: bool = False,
+    crease: float = 0.35,
     array: AntennaArray | None = None,
     antenna: Antenna | tuple[Antenna, Antenna] | None = None,
     radar: Radar | None = None,
     shadows: bool = True,
-    bounces: int = 1,
     seed: int = 0,
     max_edge: float | Literal["auto"] | None = "auto",
     max_bytes: float | None = None,
     check: bool | None = None,
+    bounces: int = 1,
     receiver: Trajectory | None = None,
     polarization: Polarization | Literal["all"] | Sequence[Polarization] = "HH",
     vertical: ArrayLike | None = None,
@@ -232,21 +235,21 @@ def echo(
     track: Trajectory,
     *,
     method: Literal["auto", "direct", "factorized"] = "auto",
-    edges: bool = False,
-    crease: float = 0.35,
     forward: bool = False,
     channels: Literal["simultaneous", "separated"] = "simultaneous",
     receive: Literal["reference", "own", "all"] = "reference",
     skip: bool | Collection[EchoSkip] = True,
+    edges: bool = False,
+    crease: float = 0.35,
     array: AntennaArray | None = None,
     antenna: Antenna | tuple[Antenna, Antenna] | None = None,
     radar: Radar | None = None,
     shadows: bool = True,
-    bounces: int = 1,
     seed: int = 0,
     max_edge: float | Literal["auto"] | None = "auto",
     max_bytes: float | None = None,
     check: bool | None = None,
+    bounces: int = 1,
     receiver: Trajectory | None = None,
     polarization: Polarization | Literal["all"] | Sequence[Polarization] = "HH",
     vertical: ArrayLike | None = None,
@@ -271,21 +274,21 @@ def echo(
     track: list[Trajectory] | tuple[Trajectory, ...],
     *,
     method: Literal["auto", "direct", "factorized"] = "auto",
-    edges: bool = False,
-    crease: float = 0.35,
     forward: bool = False,
     channels: Literal["simultaneous", "separated"] = "simultaneous",
     receive: Literal["reference", "own", "all"] = "reference",
     skip: bool | Collection[EchoSkip] = True,
+    edges: bool = False,
+    crease: float = 0.35,
     array: AntennaArray | None = None,
     antenna: Antenna | tuple[Antenna, Antenna] | None = None,
     radar: Radar | None = None,
     shadows: bool = True,
-    bounces: int = 1,
     seed: int = 0,
     max_edge: float | Literal["auto"] | None = "auto",
     max_bytes: float | None = None,
     check: bool | None = None,
+    bounces: int = 1,
     receiver: list[Trajectory] | tuple[Trajectory, ...] | None = None,
     polarization: Polarization | Literal["all"] | Sequence[Polarization] = "HH",
     vertical: ArrayLike | None = None,
@@ -533,6 +536,9 @@ def rcs(
     forward: bool = False,
     shadows: bool = True,
     check: bool | None = None,
+    bounces: int = 1,
+    edges: bool = False,
+    crease: float = 0.35,
     tolerance: float = 0.001,
     max_bytes: float | None = None,
     device: DeviceChoice | None = None,

@@ -92,6 +92,11 @@ class BounceSpreader:
         clock.lap("bounces")
         return counts
 
+    def exactly(self, pulses: np.ndarray, frequencies: np.ndarray) -> Iterator[tuple[slice, np.ndarray]]:
+        """Echoes of blocks of pulses (n,), and which these are, added one by one: see `values`."""
+        for rows in self._blocks(pulses):
+            yield rows, self.values(pulses[rows], frequencies, exact=True)[0]
+
     def _blocks(self, pulses: np.ndarray) -> Iterator[slice]:
         """Slices of pulses that are looked at together: antennas turn little within each."""
         tx, rx = (end[pulses] - self.scene.origin for end in (self.view.antennas.tx, self.view.antennas.rx))

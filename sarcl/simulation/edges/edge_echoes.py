@@ -13,7 +13,9 @@ from ...base.constants import SPEED_OF_LIGHT
 from ...base.stage_timer import Clock
 from ...numerics.polynomials import chebyshev, lagrange
 from ...numerics.pulse_geometry import half_path
+from ...opencl.device import Device
 from ...scattering.subdivision import cell_edge
+from ...scene.scene import Scene
 from ..echo_request import EchoRequest
 from ..scene_plan import EDGES, SeenScene
 from ..spreading import ChannelView, Counts
@@ -22,6 +24,7 @@ from ._edge_pieces import EdgeLight, EdgePieces, edge_pieces, longest_piece
 # Errors of amplitudes that are interpolated over the band between 1, 2, ... frequencies, x^m/(m! 2^(m - 1)), where
 # x = pi/8 for pieces of a quarter of a resolution cell
 OVER_BAND = tuple((math.pi / 8) ** m / (math.factorial(m) * 2 ** (m - 1)) for m in range(1, 16))
+PER_SIZE = 64  # pieces over the size of a scene with shadows, at least: these are looked for at the ends of pieces
 STEP = 32  # samples: phasors of so many next to one another are products of two factors
 
 
@@ -50,8 +53,18 @@ class PreparedEdges:
         near = min(float(np.linalg.norm(gap, axis=1).min()) for gap in gaps) - seen.margin
         wavelength = SPEED_OF_LIGHT / (waveform.center + waveform.bandwidth / 2)
         longest = longest_piece(wavelength, cell_edge(waveform), max(near, wavelength), error / 4)
-        pieces = edge_pieces(seen.scene, request.crease, longest)
-        light = EdgeLight(pieces, request.device, seen.scene) if request.shadows and len(pieces) else None
+        device = request.device if request.shadows else None
+        return cls.pieces_of(seen.scene, request.crease, longest, device, error)
+
+    @classmethod
+    def pieces_of(
+        cls, scene: Scene, crease: float, longest: float, device: Device | None, error: float
+    ) -> PreparedEdges:
+        """The edges of a scene in pieces no longer than `longest`, m; device  that looks for shadows, None: nothing
+        shades."""
+        size = float(np.linalg.norm(np.diff(scene.bounds, axis=0)))
+        pieces = edge_pieces(scene, crease, longest if device is None else min(longest, size / PER_SIZE))
+        light = None if device is None or not len(pieces) else EdgeLight(pieces, device, scene)
         return cls(pieces, light, error)
 
 

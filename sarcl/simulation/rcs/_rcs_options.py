@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from ...base.options import option
 from ...base.validation import flag
 from ...numerics.run_options import RunOptions
+from ..reflection_options import BounceOptions, EdgeOptions
 from ..scene_options import FORWARD
 from ..track_options import Polarization, polarizations
 
@@ -22,7 +23,7 @@ def _polarization(name: str, value: object) -> str | tuple[str, ...]:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class RcsOptions(RunOptions):
+class RcsOptions(BounceOptions, EdgeOptions, RunOptions):
     """Options of `rcs`."""
 
     receiver: tuple[ArrayLike, ArrayLike] | None = option(

@@ -24,6 +24,7 @@ from ...scene.triangles import centroids, normals
 from ...visibility.lit_parts import FacetPieces, LitParts
 from ..echo_check import exact_light
 from ..echo_sampling import warn_of_wide_angles
+from ._beyond_single import add_beyond_single_reflections, terms_beyond
 from ._rcs_task import UP, RcsTask
 from ._screens import Screens
 
@@ -63,7 +64,7 @@ class RcsPlan:
             terms.append(ErrorTerm("plane waves", (1 + 2 * k * size) / FAR, "a smaller scene"))
         if self._may_shade:
             terms.append(ErrorTerm("lit parts in complex64", FLOAT32.unit, "shadows=False"))
-        return tuple(terms)
+        return (*terms, *terms_beyond(task))
 
     @property
     def _may_shade(self) -> bool:
@@ -98,6 +99,7 @@ class RcsPlan:
             self._add_facets(part, out)
             if task.options.check:
                 self._confirm(part, out)
+        add_beyond_single_reflections(task, out)
         return out.reshape(task.shape)
 
     def _add_points(self, out: np.ndarray) -> None:

@@ -46,6 +46,11 @@ class RcsTask:
         """Whether forward scatter was asked for, and the receiver is another antenna."""
         return self.options.forward and self.to_rx is not self.to_tx
 
+    @property
+    def shading_device(self) -> Device | None:
+        """The device that looks for shadows; None: nothing shades."""
+        return self.device if self.options.shadows else None
+
     @cached_property
     def device(self) -> Device:
         """The device that finds lit parts, opened when it is first needed."""
