@@ -67,17 +67,9 @@ def lit_parts_of(
     scene, given = pieces.scene, pieces.original.triangles
     # forward scatter passes through the ground's own body: all of its facets count
     ground = np.zeros(len(given), bool) if antennas.forward else ground_of(pieces.original, antennas.ends)
-    sides = scene.two_sided, wanted, given, pieces.of, ground, upper_sides(pieces.original, ground)
-    return LitParts(
-        device,
-        FacetPieces(scene.triangles, *sides),
-        given,
-        antennas.ends,
-        max_bytes=rule.max_bytes,
-        margin=rule.margin,
-        forward=antennas.forward,
-        progress=progress,
-    )
+    sides = scene.two_sided, wanted, given, pieces.of, ground, upper_sides(pieces.original, ground), antennas.forward
+    options = {"max_bytes": rule.max_bytes, "margin": rule.margin}
+    return LitParts(device, FacetPieces(scene.triangles, *sides), given, antennas.ends, progress=progress, **options)
 
 
 def illumination_of(

@@ -68,6 +68,7 @@ class FacetPieces:
                computed first, and then of the pieces of those that are not seen whole
     ground     (n,) bool, or one for all: occluders that make up a complete terrain below all antennas
     upper      (m,) bool, or one for all: given facets of which the upper side of that terrain alone reflects
+    forward    a second antenna sees what the first one lights from any side, shaded by other bodies alone
     """
 
     triangles: np.ndarray
@@ -77,12 +78,15 @@ class FacetPieces:
     of: np.ndarray
     ground: np.ndarray | bool = False
     upper: np.ndarray | bool = False
+    forward: bool = False
 
     @classmethod
-    def uncut(cls, triangles: np.ndarray, two_sided: np.ndarray, **ground: np.ndarray) -> FacetPieces:
+    def uncut(
+        cls, triangles: np.ndarray, two_sided: np.ndarray, *, forward: bool = False, **ground: np.ndarray
+    ) -> FacetPieces:
         """Facets that are not cut, all of them wanted."""
         k = len(triangles)
-        return cls(triangles, two_sided, np.ones(k, bool), triangles, np.arange(k), **ground)
+        return cls(triangles, two_sided, np.ones(k, bool), triangles, np.arange(k), forward=forward, **ground)
 
 
 def ground_of(scene: Scene, ends: list[np.ndarray]) -> np.ndarray:
@@ -122,12 +126,10 @@ class LitParts:
         *,
         max_bytes: float,
         margin: float = 0.0,
-        forward: bool = False,
         progress: Callable[[int, int], object] | None = None,
     ) -> None:
         """ends  positions of the transmitter, and of a receiver elsewhere, m (n_pulses, 3) each
         max_bytes  on the device;  margin  m: antennas asked for later stand up to this far from `ends`
-        forward   a second antenna sees what the first one lights from any side, shaded by other bodies alone
         progress  called as progress(pulse, pulses)
         """
         self.max_bytes, self._margin, self._first = max_bytes, margin, 0
@@ -141,7 +143,7 @@ class LitParts:
         upward = np.where(np.broadcast_to(pieces.ground, len(solid))[solid, None], normals(self._occluders), 0.0)
         self._upward = upward * np.sign(upward[:, 2:])  # normals of the ground, 0 of other occluders
         own = others = None
-        if forward and len(ends) == 2:
+        if pieces.forward and len(ends) == 2:
             body = bodies_of(np.concatenate([pieces.given, self._occluders]))
             own, others = body[: len(pieces.given)], body[len(pieces.given) :]
         frame = self._origin, self._on_plane, max_bytes

@@ -146,14 +146,14 @@ class RcsPlan:
             return None
         lit_parts, rows = None, None
         if self._may_shade and self._screens is None:
-            pieces = FacetPieces.uncut(scene.triangles[keep], scene.two_sided[keep])
+            forward = task.options.forward
+            pieces = FacetPieces.uncut(scene.triangles[keep], scene.two_sided[keep], forward=forward)
             lit_parts = LitParts(
                 task.device,
                 pieces,
                 scene.triangles,
                 self._antennas,
                 max_bytes=budget(task.device, task.options.max_bytes),
-                forward=task.options.forward,
                 progress=self._progress("shadows"),
             )
             rows = np.where(lit_parts.partly, np.cumsum(lit_parts.partly) - 1, -1)
