@@ -178,8 +178,9 @@ def _triangle_echo(
         eps = scene.permittivity[i][facets]
         if i == 0 or (eps != scene.permittivity[i - 1][facets]).any():
             matrix = scattering_matrix(normal, to_image, to_rx, eps[-1], up) @ _jones(beam, rays, eps, up)
+            rows = np.ascontiguousarray(matrix.reshape(-1, 4).T)  # a product of few rows takes a tenth of the time
         amplitude = weight * np.exp(-(wave**2) * lost / 2 - 2j * np.pi * ((np.longdouble(f) * delay) % 1).astype(float))
-        out[i] = wave / (2 * np.sqrt(np.pi)) * np.tensordot(amplitude, matrix, 1)
+        out[i] = wave / (2 * np.sqrt(np.pi)) * (rows @ amplitude).reshape(2, 2)
     return out
 
 

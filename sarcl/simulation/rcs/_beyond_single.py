@@ -38,7 +38,8 @@ def terms_beyond(task: RcsTask) -> tuple[ErrorTerm, ...]:
 def refuse_together(task: RcsTask) -> None:
     """NotApplicable or ValueError for options that do not go with edges or several reflections."""
     options = task.options
-    asked = [name for name, value in (("edges=True", options.edges), ("bounces", options.bounces > 1)) if value]
+    both = (("edges=True", options.edges), (f"bounces={options.bounces}", options.bounces > 1))
+    asked = [name for name, value in both if value]
     if not asked:
         return
     if task.is_forward:
@@ -48,8 +49,13 @@ def refuse_together(task: RcsTask) -> None:
             f"bounces is {options.bounces} with shadows=False; what reflects to another facet also shades it: give "
             "shadows=True"
         )
+    if options.check:
+        raise NotApplicable(f"check=True recomputes single reflections alone, not those of {asked[0]}; leave one out")
     if task.scene.sheets.any():
-        raise NotApplicable(f"the scene has thin sheets (a material with a thickness), not computed with {asked[0]}")
+        raise NotApplicable(
+            f"the scene has thin sheets (a material with a thickness), not computed with {asked[0]}: leave it out, or "
+            "give materials without thickness"
+        )
 
 
 def add_beyond_single_reflections(task: RcsTask, out: np.ndarray) -> None:

@@ -40,5 +40,7 @@ class RcsOptions(BounceOptions, EdgeOptions, RunOptions):
         True, "True: of every facet only the part counts that both directions see; points are always seen", flag
     )
     check: bool | None = option(
-        None, "True: recompute 16 random values exactly, and raise ToleranceMissed where they differ by more"
+        None,
+        "True: recompute 16 random values exactly, and raise ToleranceMissed where they differ by more. Of single "
+        "reflections: refused with bounces and edges",
     )

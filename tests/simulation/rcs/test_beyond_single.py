@@ -90,8 +90,10 @@ def test_a_forecast_names_the_terms():
         (DIHEDRAL, {"edges": True, "forward": True, "receiver": (0.1, 0.2)}, NotApplicable, "forward"),
         (
             Scene.facets(DIHEDRAL.triangles, material=Material(3.0, thickness=2e-3)),
-            {"bounces": 2}, NotApplicable, "thin sheets",
+            {"bounces": 2}, NotApplicable, "thin sheets.*bounces=2: leave it out",
         ),
+        (DIHEDRAL, {"bounces": 2, "check": True}, NotApplicable, "check=True.*bounces=2; leave one out"),
+        (DIHEDRAL, {"edges": True, "check": True}, NotApplicable, "check=True.*edges=True; leave one out"),
         (DIHEDRAL, {"bounces": 2, "tolerance": 1e-7}, ValueError, "tolerance"),
     ],
 )  # fmt: skip
