@@ -6,11 +6,14 @@ k size^2/R, and paths are rounded to eps k R: both are k size sqrt(eps).
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.errors import NotApplicable
 from ...base.report import SMALLER_TOLERANCE, ErrorTerm
+from ...base.stage_timer import Clock
 from ...numerics.pulse_geometry import PulseGeometry
 from ...scattering.antenna_weights import AntennaWeights
 from ..bounces.bounce_spreader import BounceScene, BounceSpreader
@@ -82,6 +85,18 @@ def add_beyond_single_reflections(task: RcsTask, out: np.ndarray) -> None:
     if bounced is not None:
         for rows, values in BounceSpreader(bounced, view).exactly(np.arange(len(tx)), task.frequencies):
             out[rows] += values.transpose(0, 2, 1)
+
+
+def seconds_beyond(task: RcsTask) -> float:
+    """Seconds of what the options ask for in all directions, from those of the middle one."""
+    if not (task.options.edges or task.options.bounces > 1):
+        return 0.0
+    n, clock = len(task.to_tx), Clock()
+    tx = task.to_tx[[n // 2]]
+    one = replace(task, to_tx=tx, to_rx=tx if task.to_rx is task.to_tx else task.to_rx[[n // 2]])
+    add_beyond_single_reflections(one, np.zeros((1, len(task.frequencies), len(task.polarizations)), np.complex128))
+    clock.lap("one")
+    return n * clock.seconds["one"]
 
 
 def _size(task: RcsTask) -> float:

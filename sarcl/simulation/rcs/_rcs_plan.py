@@ -24,7 +24,7 @@ from ...scene.triangles import centroids, normals
 from ...visibility.lit_parts import FacetPieces, LitParts
 from ..echo_check import exact_light
 from ..echo_sampling import warn_of_wide_angles
-from ._beyond_single import add_beyond_single_reflections, terms_beyond
+from ._beyond_single import add_beyond_single_reflections, seconds_beyond, terms_beyond
 from ._rcs_task import UP, RcsTask
 from ._screens import Screens
 
@@ -78,7 +78,7 @@ class RcsPlan:
         return Forecast(
             "direct",
             {"directions": n, "frequencies": m, "facets": facets, "points": points},
-            n * (PER_DIRECTION + facets * (looks + PER_FACET * m) + PER_POINT * points * m),
+            n * (PER_DIRECTION + facets * (looks + PER_FACET * m) + PER_POINT * points * m) + seconds_beyond(task),
             16.0 * n * m * len(task.polarizations) + 2 * AT_ONCE,
             root_sum_square(self.error_terms),
             self.run,

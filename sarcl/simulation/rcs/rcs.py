@@ -22,8 +22,8 @@ def rcs(
     s(f) = sum_k a_k(f) exp(+j k (u_t + u_r).x_k),   k = 2 pi f/c
 
     the echo of `echo` from far away, with the origin as reference: points, and facets by physical optics with the
-    materials' Fresnel coefficients, single scattering (docs/theory/facets.md). u_t, u_r point from the scene to
-    transmitter and receiver.
+    materials' Fresnel coefficients, once reflected unless `bounces` asks for more (docs/theory/facets.md). u_t, u_r
+    point from the scene to transmitter and receiver.
 
     azimuth       rad, from x to y;  elevation  rad, from the xy plane to z; they broadcast
     frequency     Hz, one or (n,)

@@ -100,3 +100,10 @@ def test_a_forecast_names_the_terms():
 def test_bad_input(scene, options, kind, words):
     with pytest.raises(kind, match=words):
         sarcl.rcs(scene, 0.0, 0.7, F, **options)
+
+
+@pytest.mark.parametrize("options", [{"bounces": 2}, {"edges": True}])
+def test_a_forecast_holds_the_seconds_of_what_options_add(options):
+    directions = np.linspace(-0.2, 0.2, 50), 0.7, F
+    alone = sarcl.plan(sarcl.rcs, DIHEDRAL, *directions).seconds  # from a table, not from a measurement
+    assert sarcl.plan(sarcl.rcs, DIHEDRAL, *directions, **options).seconds > alone
