@@ -53,7 +53,7 @@ def test_wide_angles_without_it_are_warned_of():
     [
         ({"array": sarcl.AntennaArray.linear(3, spacing=0.05)}, "not for an array"),
         ({"scene": shapes.box((1, 1, 1), roughness=0.1)}, "facet 0 has a random echo"),
-        ({"edges": True}, "not computed with edges=True"),
+        ({"edges": True}, "not computed together with edges=True"),
         ({"method": "factorized"}, 'method="factorized" is not possible'),
     ],
 )
