@@ -218,7 +218,7 @@ BAD = {
     ),
     "polarization": (lambda: sarcl.rcs(POINT, 0, 0, 1e9, polarization="RR"), ValueError, "polarization is 'RR'"),
     "tolerance": (lambda: sarcl.rcs(BOX, 0, 0, 1e9, tolerance=1e-10), ValueError, "lit parts; the best here"),
-    "no option": (lambda: sarcl.rcs(POINT, 0, 0, 1e9, bounces=3), TypeError, "bounces"),
+    "no option": (lambda: sarcl.rcs(POINT, 0, 0, 1e9, method="direct"), TypeError, "unknown option .method"),
 }  # fmt: skip
 
 
