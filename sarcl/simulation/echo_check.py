@@ -154,7 +154,7 @@ def _bounced(scene: BounceScene, view: ChannelView, pulse: int) -> np.ndarray:
     eps = np.stack([coatings.permittivity(f)[coatings.material] for f in view.frequencies.tolist()])
     reflectivity = coatings.reflectivity * surfaces.mirrors
     sums = bounce_echo(
-        Reflectors(surfaces.triangles, surfaces.two_sided, eps, reflectivity, coatings.height),
+        Reflectors(surfaces.corners, surfaces.two_sided, eps, reflectivity, coatings.height),
         view.frequencies,
         antennas.tx[pulse] - scene.origin,
         antennas.rx[pulse] - scene.origin,

@@ -9,6 +9,7 @@ For this folder alone:
     _amplitudes      fields that several facets reflect one after the other, and the echo of the last one
     _beams           beams followed from facet to facet as convex polygons
     _facet_tree      facets that lie in cones and cylinders
+    _flat_facets     pairs of triangles joined to larger facets, and closed bodies
     _occlusion       what lies in the way of beams
     _polygons        convex polygons in space, clipped many at a time
     _sums            sums over triangles at all frequencies of the samples

@@ -7,13 +7,12 @@ in the way of an earlier leg is mirrored too, so that all shadows on facet m fal
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from ...base.vectors import dot, unit
-from ...scattering.physical_optics import normals_and_areas
 from ._facet_tree import Cones, FacetTree
 from ._polygons import Polygons, apart, folded, joined
 
@@ -21,46 +20,54 @@ ON_PLANE = 1e-6  # of the scene's diagonal: corners nearer to a plane lie in it,
 SNAP = 1e-11  # of the diagonal: rounding of clipped corners
 LEAST_AREA = 1e-10  # of a facet: smaller polygons are rounding
 GRAZING = 1e-9  # sine of the angle between a facet and a ray, below which nothing is reflected
+EDGE_ON = 1e-5  # sine below which a facet is turned away from a receiver: physical optics fades out within 2e-6
 MOST_ANGLE = 1.55  # rad, of a cone: wider ones hold everything in front
 ROWS_AT_ONCE = 200_000  # pairs of a beam and a facet that are looked at together
 
 
 @dataclass(frozen=True, eq=False)
 class Surfaces:
-    """Facets that reflect, triangles m (k, 3, 3) about the scene's centre; those not in `mirrors` only cast shadows.
+    """Facets that reflect, convex and about the scene's centre; those not in `mirrors` only cast shadows.
 
-    two_sided, mirrors  (k,) bool
+    two_sided, mirrors  (k,) bool;  closed  (k,) bool: those of closed bodies, whose shadows are those of the facets
+    that face the light
     """
 
-    triangles: np.ndarray
+    polygons: Polygons
     two_sided: np.ndarray
     mirrors: np.ndarray
+    closed: np.ndarray
+
+    @property
+    def corners(self) -> np.ndarray:
+        """Corners of the facets, some twice, m (k, n, 3)."""
+        return self.polygons.corners
 
     @cached_property
     def normals(self) -> np.ndarray:
         """Unit normals (k, 3)."""
-        return normals_and_areas(self.triangles)[0]
+        return unit(self.polygons.twice_areas)
 
     @cached_property
     def areas(self) -> np.ndarray:
         """Areas, m^2 (k,)."""
-        return normals_and_areas(self.triangles)[1]
+        return self.polygons.area
 
     @cached_property
     def centers(self) -> np.ndarray:
         """Centroids, m (k, 3)."""
-        return np.asarray(self.triangles.mean(axis=1))
+        return self.polygons.center
 
     @cached_property
     def diagonal(self) -> float:
         """Diagonal of the box of all facets, m."""
-        corners = self.triangles.reshape(-1, 3)
+        corners = self.corners.reshape(-1, 3)
         return float(np.linalg.norm(corners.max(axis=0) - corners.min(axis=0)))
 
     @cached_property
     def tree(self) -> FacetTree:
         """All facets by place."""
-        return FacetTree(self.triangles)
+        return FacetTree(self.corners)
 
     @property
     def on_plane(self) -> float:
@@ -71,6 +78,13 @@ class Surfaces:
     def snap(self) -> float:
         """Rounding of corners, m."""
         return SNAP * self.diagonal
+
+    def seen_from(self, antennas: np.ndarray) -> Surfaces:
+        """These facets for antennas, m (n, 3): bodies that may hold one of them shade from within, as open ones do."""
+        corners = self.corners[self.closed].reshape(-1, 3)
+        low, high = corners.min(axis=0, initial=np.inf), corners.max(axis=0, initial=-np.inf)
+        within = ((antennas >= low) & (antennas <= high)).all(axis=1).any()
+        return replace(self, closed=np.zeros_like(self.closed)) if within else self
 
     def facing(self, facets: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Unit normals (n, 3) of facets (n,) on the sides of places, m (n, 3); and whether these sides reflect (n,)."""
@@ -152,7 +166,7 @@ def first_facets(surfaces: Surfaces, tx: np.ndarray, turn: float) -> np.ndarray:
     sine = dot(surfaces.normals[facets], unit(middle - surfaces.centers[facets]))
     facets = facets[(sine > -turn) | surfaces.two_sided[facets]]
     image = mirrored(np.repeat(middle[None], len(facets), axis=0), surfaces.normals[facets], surfaces.centers[facets])
-    spheres = Polygons.of(surfaces.triangles[facets]).spheres
+    spheres = surfaces.polygons[facets].spheres
     return np.asarray(facets[np.unique(_reached(surfaces, facets, *spheres, image, turn)[0])])
 
 
@@ -164,9 +178,7 @@ def first(surfaces: Surfaces, tx: np.ndarray, facets: np.ndarray) -> Beams:
     rows = np.flatnonzero(reflects)
     facet, pulse, normal = facet[rows], pulse[rows], normal[rows]
     none = np.zeros((len(rows), 0), np.int64), np.zeros((len(rows), 0, 3))
-    return _sorted(
-        2 * facet + side[rows], *none, pulse, facet, normal, tx[pulse], Polygons.of(surfaces.triangles[facet])
-    )
+    return _sorted(2 * facet + side[rows], *none, pulse, facet, normal, tx[pulse], surfaces.polygons[facet])
 
 
 def reached(surfaces: Surfaces, beams: Beams, turn: float) -> tuple[np.ndarray, np.ndarray]:
@@ -174,7 +186,7 @@ def reached(surfaces: Surfaces, beams: Beams, turn: float) -> tuple[np.ndarray, 
     last, normal = beams.chains[:, -1], beams.normals[:, -1]
     image = mirrored(beams.apex[beams.first_of], normal, surfaces.centers[last])
     chain, facet = _reached(surfaces, last, *beams.bounds(beams.polygons), image, 2 * turn)
-    height = dot3(surfaces.triangles[facet] - surfaces.centers[last[chain], None], normal[chain])
+    height = dot3(surfaces.corners[facet] - surfaces.centers[last[chain], None], normal[chain])
     some = height.max(axis=1, initial=-np.inf) > surfaces.on_plane
     return chain[some], facet[some]
 
@@ -188,7 +200,7 @@ def _reached(
     which, facet = which[some], facet[some]
     some = np.ones(len(which), bool)
     for own, other in ((last[which], facet), (facet, last[which])):  # a corner of one is in front of the other
-        height = dot3(surfaces.triangles[other] - surfaces.centers[own, None], surfaces.normals[own])
+        height = dot3(surfaces.corners[other] - surfaces.centers[own, None], surfaces.normals[own])
         height = np.where(surfaces.two_sided[own, None], np.abs(height), height)
         some &= folded(np.maximum, height) > surfaces.on_plane
     return which[some], facet[some]
@@ -199,9 +211,11 @@ def dot3(corners: np.ndarray, axis: np.ndarray) -> np.ndarray:
     return np.asarray(np.matmul(corners, axis[:, :, None])[..., 0])
 
 
-def extended(surfaces: Surfaces, beams: Beams, chain: np.ndarray, facet: np.ndarray) -> tuple[Beams, int]:
+def extended(
+    surfaces: Surfaces, beams: Beams, chain: np.ndarray, facet: np.ndarray, rx: np.ndarray | None = None
+) -> tuple[Beams, int]:
     """The beams after one facet more, without shadows, for pairs (p,) of a chain and a facet; and how many pairs of a
-    beam and a facet were looked at."""
+    beam and a facet were looked at. rx  receivers, m (n_pulses, 3): only beams on facets that face them."""
     image = mirrored(beams.apex, beams.normals[beams.chain, -1], surfaces.centers[beams.last])
     planes = beams.polygons.edge_planes(image)
     n_pairs, parts = 0, []
@@ -212,10 +226,12 @@ def extended(surfaces: Surfaces, beams: Beams, chain: np.ndarray, facet: np.ndar
         n_pairs += len(row)
         target = facet[place]
         normal, reflects = surfaces.facing(target, image[row])
-        reflects &= ~apart(surfaces.triangles[target], planes[row], beams.polygons.corners[row])
+        if rx is not None:
+            reflects &= faces(surfaces, target, normal, rx[beams.pulse[row]])
+        reflects &= ~apart(surfaces.corners[target], planes[row], beams.polygons.corners[row])
         some = np.flatnonzero(reflects)
         row, place, target, normal = row[some], place[some], target[some], normal[some]
-        polygons, last = Polygons.of(surfaces.triangles[target]), beams.last[row]
+        polygons, last = surfaces.polygons[target], beams.last[row]
         side = beams.normals[beams.chain[row], -1]
         polygons = polygons.clipped(polygons.heights(side, surfaces.centers[last], surfaces.on_plane))
         polygons = polygons.seen_through(planes[row], beams.polygons.corners[row], surfaces.snap)
@@ -230,6 +246,11 @@ def extended(surfaces: Surfaces, beams: Beams, chain: np.ndarray, facet: np.ndar
     return _sorted(
         key, beams.chains[old], beams.normals[old], beams.pulse[row], target, normal, image[row], polygons
     ), n_pairs
+
+
+def faces(surfaces: Surfaces, facets: np.ndarray, normal: np.ndarray, rx: np.ndarray) -> np.ndarray:
+    """Whether receivers, m (n, 3), may see facets (n,) on the sides of normals (n, 3), edge-on too."""
+    return np.asarray(dot(normal, unit(rx - surfaces.centers[facets])) > -EDGE_ON)
 
 
 def in_blocks(number: np.ndarray, most: int = ROWS_AT_ONCE) -> list[slice]:

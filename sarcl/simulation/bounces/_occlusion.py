@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...base.vectors import dot, unit
-from ._beams import LEAST_AREA, Beams, Surfaces, in_blocks, mirrored
+from ._beams import LEAST_AREA, Beams, Surfaces, faces, in_blocks, mirrored
 from ._facet_tree import Cones
 from ._polygons import Polygons, Shadows, less_shadows
 
@@ -32,6 +32,8 @@ def seen(
     """What receivers, m (k, 3), see of pieces of beams `of` (n,): as `lit`."""
     if not len(beams):
         return pieces, of
+    some = np.flatnonzero(faces(surfaces, beams.last, beams.normals[beams.chain, -1], rx)[of])
+    pieces, of = pieces[some], of[some]
     start = Polygons(rx[:, None], np.ones(len(rx), np.int64))
     chain, shapes = _between(surfaces, beams, beams.order, beams.polygons, rx, start, turn, receives=True)
     sine = dot(beams.normals[beams.chain, -1], unit(rx - surfaces.centers[beams.last]))
@@ -104,8 +106,10 @@ def _between(
     cones = Cones(center, unit(toward), radius, np.full(len(radius), np.tan(min(2 * turn, 1.5))), length)
     chain, occluder = surfaces.tree.within(cones)
     facets = beams.chains[:, leg - 1 : leg] if leg == 1 or receives else beams.chains[:, leg - 2 : leg]
-    some = np.flatnonzero((occluder[:, None] != facets[chain]).all(axis=1))
-    chain, shapes = chain[some], Polygons.of(surfaces.triangles[occluder[some]])
+    some = (occluder[:, None] != facets[chain]).all(axis=1)
+    sine = dot(surfaces.normals[occluder], unit(image[beams.first_of[chain]] - surfaces.centers[occluder]))
+    some = np.flatnonzero(some & ((sine > -2 * turn - EDGE_ON) | ~surfaces.closed[occluder]))
+    chain, shapes = chain[some], surfaces.polygons[occluder[some]]
     for number in range(leg, leg - facets.shape[1], -1):  # in front of the facets where the leg ends and begins
         normal, point = beams.normals[chain, number - 1], surfaces.centers[beams.chains[chain, number - 1]]
         height = shapes.heights(normal, point, surfaces.on_plane)

@@ -9,6 +9,7 @@ import numpy as np
 from ...base.vectors import cross
 
 SHORT = 1e-9  # of a polygon's longest edge: shorter ones are rounding, and have no direction
+PAIRS_AT_ONCE = 200_000  # of a piece and a shadow that are looked at together
 MOST_PIECES = 4_000_000  # polygons that shadows may leave: about 1 GB
 
 
@@ -36,11 +37,15 @@ class Polygons:
         return np.arange(self.corners.shape[1]) < self.count[:, None]
 
     @property
+    def twice_areas(self) -> np.ndarray:
+        """Normals, right-handed about the corners, as long as twice the areas, m^2 (k, 3)."""
+        spokes = self.corners[:, 1:] - self.corners[:, :1]
+        return folded(np.add, cross(spokes[:, :-1], spokes[:, 1:]).swapaxes(1, 2))
+
+    @property
     def area(self) -> np.ndarray:
         """Areas, m^2 (k,)."""
-        spokes = self.corners[:, 1:] - self.corners[:, :1]
-        twice = folded(np.add, cross(spokes[:, :-1], spokes[:, 1:]).swapaxes(1, 2))
-        return np.asarray(np.where(self.count > 2, np.sqrt(folded(np.add, twice**2)) / 2, 0.0))
+        return np.asarray(np.where(self.count > 2, np.sqrt(folded(np.add, self.twice_areas**2)) / 2, 0.0))
 
     @property
     def center(self) -> np.ndarray:
@@ -183,40 +188,60 @@ def less_shadows(
     """
     shadows = shadows[np.argsort(shadows.of, kind="stable")]
     number = np.bincount(shadows.of, minlength=len(least))
-    first = np.cumsum(number) - number
+    owner, shadow = _repeated((np.cumsum(number) - number)[of], number[of])
     done: list[tuple[Polygons, np.ndarray]] = []
-    for turn in range(int(number.max(initial=0))):
-        over = number[of] <= turn
-        done.append((pieces[over], of[over]))
-        pieces, of = pieces[~over], of[~over]
-        pieces, of = _cut_once(pieces, of, shadows[first[of] + turn], least, snap)
+    while True:  # of each piece, the shadows that are still to be cut off, those first that came first
+        some = _near(pieces, owner, shadows, shadow)
+        owner, shadow = owner[some], shadow[some]
+        number = np.bincount(owner, minlength=len(of))
+        done.append((pieces[number == 0], of[number == 0]))
+        shaded = np.flatnonzero(number)
+        if not len(shaded):
+            break
+        first = (np.cumsum(number) - number)[shaded]
+        parts, part_of = _cut_once(pieces[shaded], shadows[shadow[first]], least[of[shaded]], snap)
+        owner, pair = _repeated(first[part_of] + 1, number[shaded][part_of] - 1)
+        pieces, of, shadow = parts, of[shaded][part_of], shadow[pair]
         if len(of) > MOST_PIECES:
             raise MemoryError(
                 f"shadows cut what facets reflect to one another into more than {MOST_PIECES:,} parts at a time; take "
                 "fewer bounces or a coarser mesh"
             )
-    done.append((pieces, of))
     of = np.concatenate([owners for _, owners in done])
     order = np.argsort(of, kind="stable")
     return joined([part for part, _ in done])[order], of[order]
 
 
-def _cut_once(
-    pieces: Polygons, of: np.ndarray, shadows: Shadows, least: np.ndarray, snap: float
-) -> tuple[Polygons, np.ndarray]:
-    """Pieces less one shadow each."""
-    shaded = ~apart(pieces.corners, shadows.planes, shadows.corners)
-    parts, owners = [pieces[~shaded]], [of[~shaded]]
-    inner, of, shadows = pieces[shaded], of[shaded], shadows[shaded]
-    uncut, outer = inner, []
+def _repeated(start: np.ndarray, number: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Places i (p,) in lists start, number (n,), and start_i, start_i + 1 ... of `number` values for each."""
+    place = np.repeat(np.arange(len(number)), number)
+    return place, np.arange(len(place)) + np.repeat(start - (np.cumsum(number) - number), number)
+
+
+def _near(pieces: Polygons, owner: np.ndarray, shadows: Shadows, shadow: np.ndarray) -> np.ndarray:
+    """Pairs of a piece and a shadow (p,) that no plane of the shadow keeps apart."""
+    near = np.zeros(len(owner), bool)
+    for begin in range(0, len(owner), PAIRS_AT_ONCE):
+        rows = slice(begin, begin + PAIRS_AT_ONCE)
+        near[rows] = ~apart(pieces.corners[owner[rows]], shadows.planes[shadow[rows]], shadows.corners[shadow[rows]])
+    return np.flatnonzero(near)
+
+
+def _cut_once(pieces: Polygons, shadows: Shadows, least: np.ndarray, snap: float) -> tuple[Polygons, np.ndarray]:
+    """Pieces less one shadow each, larger than `least`, m^2 (n,); and of which piece each is a part."""
+    inner, before = pieces, []
     for edge in range(shadows.planes.shape[1]):
-        is_edge = folded(np.logical_or, shadows.planes[:, edge] != 0)
         height = inner.heights(shadows.planes[:, edge], shadows.corners[:, edge], snap)
-        outer.append(inner.clipped(np.where(is_edge[:, None], -height, -1.0)))
+        before.append((inner, height))
         inner = inner.clipped(height)
-    falls = inner.area > least[of]
-    for part, counts in [*((part, falls) for part in outer), (uncut, ~falls)]:
-        some = np.flatnonzero(counts & (part.area > least[of]))
-        parts.append(part[some])
-        owners.append(of[some])
+    falls = inner.area > least
+    some = np.flatnonzero(~falls)
+    parts, owners = [pieces[some]], [some]
+    for edge, (inner, height) in enumerate(before):
+        is_edge = folded(np.logical_or, shadows.planes[:, edge] != 0)
+        some = np.flatnonzero(falls & is_edge & (folded(np.minimum, height) < 0))
+        part = inner[some].clipped(-height[some])
+        large = part.area > least[some]
+        parts.append(part[large])
+        owners.append(some[large])
     return joined(parts), np.concatenate(owners)

@@ -19,6 +19,7 @@ from ..spreading import ChannelView, Counts
 from . import _beams, _occlusion, _sums
 from ._amplitudes import Coatings, Facets
 from ._beams import Beams, Surfaces
+from ._flat_facets import closed, joined_facets
 from ._polygons import Polygons
 
 PULSES_AT_ONCE, BEAMS_AT_ONCE = 128, 60_000  # pulses of a block, and pairs of these and facets that reflect to others
@@ -55,7 +56,21 @@ class BounceScene:
         origin = box(triangles.reshape(-1, 3)).mean(axis=0)
         height = np.hypot(np.where(mirrors, fine, 0.0), scene.roughness[some])
         coatings = Coatings(material, scene.materials, reflectivity, height)
-        return cls(Surfaces(triangles - origin, scene.two_sided[some], mirrors), coatings, origin, bounces, tolerance)
+        surfaces = Surfaces(Polygons.of(triangles - origin), scene.two_sided[some], mirrors, closed(triangles))
+        return cls(surfaces, coatings, origin, bounces, tolerance)
+
+    @cached_property
+    def joined(self) -> tuple[Surfaces, Coatings]:
+        """These facets, pairs of triangles of one plane and material joined where together they are convex."""
+        surfaces, coatings = self.surfaces, self.coatings
+        alike = coatings.material, coatings.reflectivity, coatings.height, surfaces.two_sided, surfaces.mirrors
+        groups = np.unique(np.stack(alike, axis=1), axis=0, return_inverse=True)[1].ravel()
+        polygons, some = joined_facets(surfaces.corners, groups, surfaces.diagonal)
+        coatings = Coatings(
+            coatings.material[some], coatings.materials, coatings.reflectivity[some], coatings.height[some]
+        )
+        flags = surfaces.two_sided[some], surfaces.mirrors[some], surfaces.closed[some]
+        return Surfaces(polygons, *flags), coatings
 
     @cached_property
     def mirrors(self) -> np.ndarray:
@@ -73,6 +88,9 @@ class BounceSpreader:
     def __init__(self, scene: BounceScene, view: ChannelView) -> None:
         self.scene, self.view = scene, view
         self.predicted_error = scene.tolerance
+        surfaces, self._coatings = scene.joined
+        antennas = np.concatenate([view.antennas.tx, view.antennas.rx]) - scene.origin
+        self._surfaces = surfaces.seen_from(antennas)
 
     def describe(self) -> dict[str, Any]:
         """Words and numbers for a report."""
@@ -111,7 +129,7 @@ class BounceSpreader:
     def values(self, pulses: np.ndarray, frequencies: np.ndarray, *, exact: bool = False) -> tuple[np.ndarray, Counts]:
         """Echoes of pulses (n,) at frequencies, Hz, complex128 (n, n_polarizations, n_f); exact: added one by one."""
         out = np.zeros((len(pulses), len(self.view.polarizations), len(frequencies)), np.complex128)
-        counts, origin, surfaces = Counts(), self.scene.origin, self.scene.surfaces
+        counts, origin, surfaces = Counts(), self.scene.origin, self._surfaces
         tx, rx = (end[pulses] - origin for end in (self.view.antennas.tx, self.view.antennas.rx))
         turn = max(self._turn(tx), self._turn(rx))
         facets = _beams.first_facets(surfaces, tx, turn)
@@ -137,11 +155,12 @@ class BounceSpreader:
     ) -> Iterator[tuple[Beams, Polygons, np.ndarray, int]]:
         """Beams of each order from 2 on, their pulses counted from 0, what receivers, m (n, 3), see of them, the beam
         of each piece, and the number of pairs of beam and facet that were looked at; beams  of the first order."""
-        surfaces = self.scene.surfaces
-        for _ in range(self.scene.bounces - 1):
+        surfaces = self._surfaces
+        for number in range(2, self.scene.bounces + 1):
             if not len(beams):
                 return
-            beams, n_pairs = _beams.extended(surfaces, beams, *_beams.reached(surfaces, beams, turn))
+            last = rx if number == self.scene.bounces else None
+            beams, n_pairs = _beams.extended(surfaces, beams, *_beams.reached(surfaces, beams, turn), last)
             pieces, of = _occlusion.lit(surfaces, beams, turn)
             arrives = np.bincount(of, minlength=len(beams)) > 0
             beams, of = beams[np.flatnonzero(arrives)], (np.cumsum(arrives) - 1)[of]
@@ -149,7 +168,7 @@ class BounceSpreader:
 
     def _turn(self, antennas: np.ndarray) -> float:
         """Angle, rad, by which directions from any facet to antennas, m (n, 3), differ from those to the middle one."""
-        low, high = box(self.scene.surfaces.triangles.reshape(-1, 3))
+        low, high = box(self._surfaces.corners.reshape(-1, 3))
         middle = antennas[len(antennas) // 2]
         step = float(np.linalg.norm(antennas - middle, axis=1).max())
         if not step:
@@ -189,21 +208,21 @@ class BounceSpreader:
         return np.flatnonzero((delta >= antennas.near[row]) & (delta <= antennas.far[row]))
 
     def _add(self, out: np.ndarray, pulses: np.ndarray, frequencies: np.ndarray, facets: Facets, exact: bool) -> None:
-        view, scene = self.view, self.scene
+        view, scene, coatings = self.view, self.scene, self._coatings
         row = facets.beams.pulse
         delay = (facets.path - 2 * view.antennas.reference_range[pulses[row]]) / SPEED_OF_LIGHT
         band = np.array([frequencies.min(), frequencies.max()])
-        varies = scene.coatings.disperses or view.weights.varies_over_band
+        varies = coatings.disperses or view.weights.varies_over_band
         at = chebyshev(band.mean(), float(np.ptp(band)), NODES) if varies and np.ptp(band) else band[:1]
         matrices = np.stack([self._weighted(facets, pulses, float(f)) for f in at], axis=1)
 
         def amplitudes(some: np.ndarray, wanted: np.ndarray) -> np.ndarray:
             basis = lagrange(at, wanted)
-            shapes = facets.chosen(some).shapes(wanted, scene.coatings)
+            shapes = facets.chosen(some).shapes(wanted, coatings)
             return np.asarray(shapes[:, :, None] * np.einsum("nmj,mf->nfj", matrices[some], basis))
 
         error = PROFILES * scene.tolerance
-        extra = 1 + (NODES - 1) * varies + 4 * bool(scene.coatings.height.any())
+        extra = 1 + (NODES - 1) * varies + 4 * bool(coatings.height.any())
         nodes = _sums.nodes_for(np.pi * float(np.ptp(band)) / SPEED_OF_LIGHT * facets.widest, error, extra)
         if exact:  # at any frequencies
             nodes = np.full(len(nodes), len(frequencies))
@@ -212,7 +231,7 @@ class BounceSpreader:
     def _weighted(self, facets: Facets, pulses: np.ndarray, frequency: float) -> np.ndarray:
         """Matrices of triangles times the weights of the antennas, complex128 (n, n_polarizations)."""
         view, beams = self.view, facets.beams
-        out = facets.matrices(frequency, self.scene.coatings, view.polarizations, view.vertical)
+        out = facets.matrices(frequency, self._coatings, view.polarizations, view.vertical)
         if not view.weights.is_needed:
             return out
         leaving = facets.rays()[0] * np.linalg.norm(facets.center - beams.apex, axis=1)[:, None]

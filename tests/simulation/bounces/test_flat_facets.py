@@ -1,0 +1,80 @@
+"""Facets that are joined before beams are followed, and closed bodies of which only the lit side shades."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import sarcl
+from sarcl.base.errors import NothingSeen
+
+CHIRP = sarcl.Waveform.chirp(center=9.6e9, bandwidth=50e6, duration=1e-6)
+PLATES = np.array(
+    [[(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [(0, 0, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1)]], float
+)  # a dihedral
+LOOK = sarcl.Trajectory(None, np.array([[1e3, 40, 1e3]]))
+
+
+def halves(quads: np.ndarray) -> np.ndarray:
+    """Two triangles of each quadrilateral (k, 4, 3)."""
+    return quads[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3, 3)
+
+
+def block(low: tuple[float, float, float], high: tuple[float, float, float]) -> np.ndarray:
+    """Twelve triangles of a closed box, turned outwards."""
+    a, b = np.array(low), np.array(high)
+    corner = np.array([np.where([i & 1, i & 2, i & 4], b, a) for i in range(8)])
+    return halves(corner[[(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]])
+
+
+def echo(scene: sarcl.Scene, track: sarcl.Trajectory = LOOK) -> sarcl.PhaseHistory:
+    options = {"reference": (0.5, 0.5, 0.5), "range_window": (-5, 5), "tolerance": 1e-2, "check": False}
+    return sarcl.echo(scene, CHIRP, track, bounces=2, **options)
+
+
+def number_of_two(raw: sarcl.PhaseHistory) -> int:
+    """Echoes of two reflections that a report counts."""
+    counts = dict(part.split(": ") for part in str(raw.report.plan["contributions by reflections"]).split(", "))
+    return int(counts["2"])
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.4])
+def test_halves_of_a_rectangle_reflect_as_one_facet(turn):
+    c, s = np.cos(turn), np.sin(turn)
+    axes = np.array([(c, -s, 0), (s, c, 0), (0, 0, 1)])
+    assert number_of_two(echo(sarcl.Scene.facets(halves(PLATES) @ axes.T))) == 2
+
+
+def test_facets_of_different_materials_and_halves_that_are_not_flat_stay_apart():
+    triangles = halves(PLATES)
+    mixed = sarcl.Scene.facets(triangles, material=[0, 1, 0, 0], materials=["metal", sarcl.Material(4.0 - 0.2j)])
+    assert number_of_two(echo(mixed)) > 2
+    triangles[0, 1] += (0, 0, 1e-4)
+    assert number_of_two(echo(sarcl.Scene.facets(triangles))) > 2
+
+
+def test_a_quadrilateral_with_a_reflex_corner_stays_two_triangles():
+    dart = PLATES.copy()
+    dart[0, 1] = (0.3, 0.4, 0)  # inside the line from one neighbour to the other
+    dart[0, 2], dart[0, 3] = (1, 1, 0), (0, 1, 0)
+    kite = dart[0][[[0, 1, 3], [1, 2, 3]]]
+    assert number_of_two(echo(sarcl.Scene.facets(np.concatenate([kite, halves(PLATES[1:])])))) > 2
+
+
+def test_a_closed_body_shades_as_the_same_body_with_open_edges():
+    body = block((0.4, 0.2, 0.0), (0.7, 0.6, 0.4))
+    center = body.mean(axis=1, keepdims=True)
+    closed, open_ = (np.concatenate([halves(PLATES), center + share * (body - center)]) for share in (1.0, 1.0 - 1e-7))
+    two_sided = np.repeat([True, False], (4, 12))
+    values = [echo(sarcl.Scene.facets(one, two_sided=two_sided)).samples for one in (closed, open_)]
+    free = echo(sarcl.Scene.facets(halves(PLATES), two_sided=np.ones(4, bool))).samples
+    assert np.linalg.norm(values[0] - values[1]) <= 1e-2 * np.linalg.norm(values[1])
+    assert np.linalg.norm(free - values[1]) > 0.1 * np.linalg.norm(free)  # it hides a part
+
+
+def test_nothing_outside_is_lit_from_inside_a_body():
+    place = LOOK.positions[0]
+    body = block(tuple(place - 1), tuple(place + 1))
+    scene = sarcl.Scene.facets(np.concatenate([halves(PLATES), body]), two_sided=np.repeat([True, False], (4, 12)))
+    with pytest.raises(NothingSeen):  # but the walls about the antenna, outside the range window
+        echo(scene)
