@@ -159,11 +159,13 @@ def test_fig_13_a_shadow_holds_no_speckle(parallelepiped):
     assert decibel(power[dark].max() / lit) < -60 and decibel(power[dark].mean() / lit) < -70
 
 
-@pytest.mark.slow
-def test_fig_13_a_shadow_stays_dark_where_its_edges_move():
-    # in a wide aperture the shadow moves by half a metre along the track: amplitudes of facets on its edges, roots of
-    # lit shares, change from pulse to pulse and their echoes spread, to -57.4 dB in the shadow. So do those facets
-    # summed one by one; echo and focusing must add less (shares that stepped from block to block would leave -45 dB)
+@pytest.fixture(scope="module")
+def moving_shadow():
+    """Power in a shadow whose edges move, of all and without the facets on its edges, dB of the ground beside it.
+
+    In a wide aperture the shadow moves by half a metre along the track: amplitudes of facets on its edges, roots of lit
+    shares, change from pulse to pulse, and their echoes spread.
+    """
     radar = Radar(look=np.radians(50), bandwidth=300e6, turn=0.05, n_pulses=192)
     box = shapes.box((8, 12, 6), **STONE)
     scene = ground((-24, 24), (-24, 30), **STONE) + box
@@ -177,7 +179,19 @@ def test_fig_13_a_shadow_stays_dark_where_its_edges_move():
         for samples in (raw.samples, others)
     )
     lit = both[(y < 16) & (x > 16) & (x < 22)].mean()
-    assert decibel(rest[dark].mean() / lit) < -70 and decibel(both[dark].mean() / lit) < -57
+    return decibel(both[dark].mean() / lit), decibel(rest[dark].mean() / lit)
+
+
+@pytest.mark.slow
+@pytest.mark.xfail(strict=True, reason="-57.4 dB: the facets on the edges, summed one by one, leave -57.6 dB")
+def test_fig_13_a_shadow_stays_dark_where_its_edges_move(moving_shadow):
+    assert moving_shadow[0] < -60
+
+
+@pytest.mark.slow
+def test_fig_13_echo_and_focusing_add_little_to_a_shadow_whose_edges_move(moving_shadow):
+    # shares that stepped from block to block of pulses would leave -45 dB
+    assert moving_shadow[0] < -57 and moving_shadow[1] < -70
 
 
 def edges_of_a_shadow(radar, scene, box, raw, seed):
