@@ -19,7 +19,12 @@ docs/developers/architecture.md.
 
 import ast
 import os
+import sys
+from collections.abc import Sequence
 from importlib import import_module
+from importlib.abc import Loader, MetaPathFinder
+from importlib.machinery import ModuleSpec
+from types import ModuleType
 from typing import Any
 
 from .base.version import __version__ as __version__
@@ -60,6 +65,25 @@ def __getattr__(name: str) -> Any:
         value = import_module(f"{home.rstrip('.')}.{attribute}", __name__)
     globals()[name] = value
     return value
+
+
+class _PublicModules(MetaPathFinder, Loader):
+    """`import sarcl.shapes` gives the module that `from sarcl import shapes` gives, wherever its file is."""
+
+    def find_spec(
+        self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        """A spec for a public module in one of the rooms; None for all other names."""
+        prefix, _, name = fullname.rpartition(".")
+        public = prefix == __name__ and name in _PUBLIC and isinstance(__getattr__(name), ModuleType)
+        return ModuleSpec(fullname, self) if public else None
+
+    def exec_module(self, module: ModuleType) -> None:
+        """Put the module of the room in the place of the new, empty one."""
+        sys.modules[module.__name__] = __getattr__(module.__name__.rpartition(".")[2])
+
+
+sys.meta_path.append(_PublicModules())
 
 
 def __dir__() -> list[str]:

@@ -23,6 +23,7 @@ from .effects import stop_and_go as stop_and_go
 from .effects.noise import add_noise as add_noise
 from .experiments import fda as fda
 from .imaging.compress import compress as compress
+from .imaging.default_grid import default_grid as default_grid
 from .imaging.strip_map import EffectiveVelocity as EffectiveVelocity
 from .imaging.strip_map import doppler_centroid as doppler_centroid
 from .imaging.strip_map import effective_velocity as effective_velocity

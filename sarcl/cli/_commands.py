@@ -229,9 +229,9 @@ def _grid_options(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _default_grid(raw: PhaseHistory, job: Job, options: dict[str, Any]) -> ImageGrid:
-    from ..imaging.default_grid import default_grid
+    from ..imaging.default_grid import choose_grid
 
-    choice = default_grid(raw, **options)
+    choice = choose_grid(raw, **options)
     grid = choice.grid
     assert grid.spacing is not None and grid.center is not None
     pixels = f"{grid.shape[0]} x {grid.shape[1]} pixels of {grid.spacing[0]:.4g} x {grid.spacing[1]:.4g} m"

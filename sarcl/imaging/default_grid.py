@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,13 +13,13 @@ from numpy.typing import ArrayLike
 from ..base import wgs84
 from ..base.constants import SPEED_OF_LIGHT
 from ..base.rows import spread_over
-from ..base.validation import choice, number
+from ..base.validation import choice, instance, number
 from ..earth import zero_doppler
 from ..earth.elevation import ElevationModel
 from ..model.image_grid import ImageGrid
+from ..model.phase_history import PhaseHistory
 
-if TYPE_CHECKING:
-    from ..model.phase_history import PhaseHistory
+log = logging.getLogger(__name__)
 
 MOST = 1024  # pixels along a side, at most
 ROWS = 4096  # rows from which the geometry is taken
@@ -28,7 +29,7 @@ WELL_POSED, FIXED = 0.02, 0.001
 
 
 @dataclass(frozen=True, eq=False)
-class DefaultGrid:
+class GridChoice:
     """A plane, and the reason for its choice in words."""
 
     grid: ImageGrid
@@ -41,24 +42,42 @@ def default_grid(
     center: ArrayLike | None = None,
     shape: int | Sequence[int] | None = None,
     spacing: float | Sequence[float] | None = None,
+    side: str | None = None,
+    heights: float | ElevationModel = 0.0,
+) -> ImageGrid:
+    """The plane on which `sarcl focus` images echoes without a grid; arguments that are None are chosen from the data.
+
+    raw      echoes, whose geometry alone is looked at
+    center   m (3,): the point whose range equals reference_range in every row: the origin where that holds to within a
+             resolution cell; else by least squares, on z = 0 unless the directions to the antennas determine z too;
+             else the origin
+    spacing  m: half the resolution along rows and columns, from the frequencies and directions in the data
+    shape    the extent that the frequency step and the angle between rows leave unambiguous, at most 1024 pixels
+    side     "left" or "right" of the track, for Earth-fixed echoes without a center
+    heights  m above the ellipsoid, or an ElevationModel, of the center of Earth-fixed echoes
+
+    The plane is horizontal; of Earth-fixed echoes it is tangent to the ellipsoid at its center, and columns run east.
+    The reasons for the choice are logged (INFO). TypeError where raw is no PhaseHistory; ValueError for echoes without
+    rows, and for Earth-fixed ones without side and center.
+    """
+    instance("raw", raw, PhaseHistory)
+    chosen = choose_grid(raw, center=center, shape=shape, spacing=spacing, side=side, heights=heights)
+    log.info("grid from the data: %s", chosen.why)
+    return chosen.grid
+
+
+def choose_grid(
+    raw: PhaseHistory,
+    *,
+    center: ArrayLike | None = None,
+    shape: int | Sequence[int] | None = None,
+    spacing: float | Sequence[float] | None = None,
     normal: ArrayLike | None = None,
     x_axis: ArrayLike | None = None,
     side: str | None = None,
     heights: float | ElevationModel = 0.0,
-) -> DefaultGrid:
-    """A plane (horizontal by default) for a phase history; arguments that are None are chosen from the data.
-
-    center   the point whose range equals reference_range in every row: the origin where that holds to within a
-             resolution cell; else by least squares, on z = 0 unless the directions to the antennas determine z too;
-             else the origin
-    spacing  half the resolution along rows and columns, from the frequencies and directions in the data
-    shape    the extent that the frequency step and the angle between rows leave unambiguous, at most 1024 pixels
-    normal, x_axis   as in `ImageGrid.plane`
-
-    Of Earth-fixed echoes, as those of orbits, the centre lies at `heights` above the ellipsoid, m or an ElevationModel,
-    right or left of the track as `side` says, the plane is the ellipsoid's tangent there, and columns run east.
-    ValueError where the side is needed, and None.
-    """
+) -> GridChoice:
+    """As `default_grid`, with the reasons for the choice; normal, x_axis as in `ImageGrid.plane`."""
     part = raw if raw.n_rows <= ROWS else raw[spread_over(raw.n_rows, ROWS)]
     why = []
     on_earth = needs_side(part)
@@ -86,7 +105,7 @@ def default_grid(
         shape = [min(n, MOST) for n in unambiguous]
         limit = "" if shape == unambiguous else f"{MOST} pixels at most of "
         why.append(f"{limit}the {swath:.4g} m that are unambiguous")
-    return DefaultGrid(ImageGrid.plane(shape=shape, spacing=spacing, **axes), "; ".join(why))
+    return GridChoice(ImageGrid.plane(shape=shape, spacing=spacing, **axes), "; ".join(why))
 
 
 def _excess(raw: PhaseHistory, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

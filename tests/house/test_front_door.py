@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import importlib
 import shutil
 import subprocess
 import sys
@@ -44,6 +45,18 @@ def test_public_modules_are_there_after_a_bare_import():
     assert run("import sarcl; print(sarcl.shapes.sphere.__name__, sarcl.fda.run.__name__)") == "sphere run"
 
 
+@pytest.mark.parametrize("name", MODULES)
+def test_public_modules_are_imported_as_they_are_named(name):
+    module = importlib.import_module(f"sarcl.{name}")
+    assert module is getattr(sarcl, name) and module.__spec__.name == module.__name__
+
+
+def test_names_that_are_no_modules_are_not_imported_as_such():
+    for name in ("echo", "backprojekt"):
+        with pytest.raises(ModuleNotFoundError, match=f"sarcl.{name}"):
+            importlib.import_module(f"sarcl.{name}")
+
+
 def test_dir_shows_the_public_names_and_nothing_else():
     assert dir(sarcl) == sorted([*sarcl.__all__, "__version__"])
     # rooms that were imported on the way are no public names
@@ -59,7 +72,7 @@ def test_all_of_the_contract_is_there():
         "echo beam ambiguity compress map_aperture backproject polar_format autofocus measure read concatenate devices "
         "plan Forecast PointResponse Ambiguity add_noise NoDeviceError SarclWarning "
         "ToleranceMissed ToleranceUnreachable Orbit ElevationModel spectral_echo range_doppler rcs "
-        "doppler_centroid effective_velocity EffectiveVelocity fullwave_echo"
+        "doppler_centroid effective_velocity EffectiveVelocity fullwave_echo default_grid"
     ).split()
     assert set(sarcl.__all__) == {*wanted, *MODULES}
 
