@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from ..base import validation
+from ..base.errors import warn
 from . import (
     _collada_checks,
     _gltf_checks,
@@ -26,6 +27,10 @@ from . import (
 
 if TYPE_CHECKING:
     import trimesh
+
+# Metres per unit; the inch and the foot are international (NIST SP 811, appendix B.6)
+UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
+LARGE = 1e3  # m: longer than most models of single objects in metres, shorter than a car in millimetres
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +75,35 @@ def load(mesh: object, repair: bool = True, external: bool = False) -> Mesh:
     kept, turned, closed = _mesh_repair.repaired(vertices, faces, repair, what)
     faces = np.where(turned[:, None], faces[:, ::-1], faces)[kept]
     return Mesh(vertices[faces], part[kept], names, closed, _unit(mesh, what))
+
+
+def metres_per_unit(mesh: Mesh, scale: float | None, units: str | None) -> float:
+    """Metres per unit of a mesh: as given by one of both arguments, else as its file names it, else 1.
+
+    A warning gives the size of the scene where the file's unit is not the metre, and of one of more than LARGE metres
+    without a unit. ValueError where both are given.
+    """
+    if units is not None:
+        if scale is not None:
+            raise ValueError(f"scale={scale!r} and units={units!r} both say how long a unit of the mesh is; give one")
+        return UNITS[validation.choice("units", units, tuple(UNITS))]
+    if scale is not None:
+        return validation.number("scale", scale, above=0)
+    size = float(np.ptp(mesh.triangles.reshape(-1, 3), axis=0).max())
+    if mesh.unit is None:
+        if size > LARGE:
+            warn(
+                f"this mesh names no unit and is taken in metres: its longest side is {size:.4g} m. Give units='mm' if "
+                "it is in millimetres (or 'cm', 'in', 'ft'), or units='m' to confirm it"
+            )
+        return 1.0
+    if mesh.unit != 1:
+        warn(
+            f"the unit of this mesh is {mesh.unit:g} m, as its file says: its longest side is taken as "
+            f"{size * mesh.unit:.4g} m. Give scale={mesh.unit:g} to confirm it, or another scale, m per unit, where "
+            "the file is wrong"
+        )
+    return mesh.unit
 
 
 def _unit(scene: trimesh.Scene, what: str) -> float | None:

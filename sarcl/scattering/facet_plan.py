@@ -18,7 +18,7 @@ from ..numerics import cost_model
 from ..numerics.polynomials import chebyshev, lagrange
 from ..numerics.pulse_geometry import PulseGeometry
 from ..scene.scene import Scene
-from ..scene.triangles import centroids, distances, edges
+from ..scene.triangles import centroids, distances, edges, longest_side
 from ._cutting_error import CuttingError
 from ._direction_error import DirectionError
 from ._frequency_nodes import OverBand, cross_polarization_ratio
@@ -234,7 +234,8 @@ class _PlanSearch:
             return ToleranceUnreachable(tolerance, reach, limit, remedy, how=how)
         if tolerance <= self.least_rounding < np.inf:  # inf: even the largest pieces are too many
             return ToleranceUnreachable(tolerance, reach, float32, how="with facets in float32")
-        most, remedy = self.limits.most if self.fits else self.in_memory, "take a smaller scene"
+        most = self.limits.most if self.fits else self.in_memory
+        remedy = f"take a smaller scene (this one is {longest_side(self.view.scene.triangles):.4g} m long)"
         how = f"without cutting these facets into more than {most:,.0f}"
         if most < self.limits.most:
             memory = size_text(self.limits.max_bytes)

@@ -74,7 +74,7 @@ class RoughPieces:
         longest = lengths.max(axis=1)
         refuse_many(facets, ROUND * cell, most)
         if np.maximum(longest / (ROUND * cell), 1.0).sum() > most:  # pieces along one edge of each
-            raise too_many(ROUND * cell, most)
+            raise too_many(facets, ROUND * cell, most)
         large = longest > COARSE * ROUND * cell
         if large.any():
             parts, sizes, whole = cut_lengths(facets[large], COARSE * ROUND * cell, most)
@@ -85,7 +85,7 @@ class RoughPieces:
         pieces = cls(device, scene, cell, seed, facets[order], lengths[order], of[order], counts)
         pieces = replace(pieces, counts=pieces._counted())
         if len(pieces) > most or pieces.counts.min(initial=1) == 0:
-            raise too_many(ROUND * cell, most)
+            raise too_many(facets, ROUND * cell, most)
         return pieces
 
     @staticmethod

@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..base import validation
 from ..base.boxes import box
-from ..base.errors import warn
 from . import _changes, terrain
 from . import triangles as geometry
 from ._kept import Kept
@@ -193,6 +192,7 @@ class Scene:
         *,
         material: MaterialLike | Mapping[str, MaterialLike] = "metal",
         scale: float | None = None,
+        units: Literal["m", "cm", "mm", "in", "ft"] | None = None,
         position: ArrayLike = (0.0, 0.0, 0.0),
         rotation: ArrayLike | Rotation | None = None,
         max_edge: float | None = None,
@@ -205,7 +205,8 @@ class Scene:
         material  one for all, or {part: material}, a part named by its node, geometry or material in the file;
                   "*" is every part not named
         scale     m per unit of the file; None: the unit that the file names (.dae and .3mf do; a warning says so where
-                  it is not the metre), else 1
+                  it is not the metre), else 1, with a warning for a scene longer than 1 km
+        units     "m", "cm", "mm", "in" or "ft": the unit of the file, in place of scale
         position  m (3,)
         rotation  matrix (3, 3), rotation vector (3,) in rad, one angle about z in rad, or scipy's Rotation
         max_edge  cut facets until no edge is longer, m; `echo` also cuts to what the waveform resolves
@@ -217,22 +218,13 @@ class Scene:
         matter. Raises FileNotFoundError or ValueError for a file that is missing, unreadable or without faces, and for
         corners that are not finite.
         """
-        from ..io.mesh import load, part_materials
+        from ..io.mesh import load, metres_per_unit, part_materials
 
-        if scale is not None:
-            scale = validation.number("scale", scale, above=0)
         position = validation.array("position", position, np.float64, (3,))
         rotate = geometry.rotation(rotation)
         content = load(mesh, validation.flag("repair", repair), validation.flag("external", external))
         parts = part_materials(material, content)
-        if scale is None:
-            scale = 1.0 if content.unit is None else content.unit
-            if scale != 1:
-                size = float(np.ptp(content.triangles.reshape(-1, 3), axis=0).max()) * scale
-                warn(
-                    f"the unit of this mesh is {scale:g} m, as its file says: its longest side is taken as {size:.4g} "
-                    f"m. Give scale={scale:g} to confirm it, or another scale, m per unit, where the file is wrong"
-                )
+        scale = metres_per_unit(content, scale, units)
         with np.errstate(over="ignore", invalid="ignore"):
             corners = content.triangles * scale @ rotate.T + position
         geometry.check_reach(f"corners of a mesh of scale {scale:g}", corners)

@@ -90,24 +90,29 @@ def cut_lengths(triangles: np.ndarray, max_edge: float, max_facets: int) -> tupl
             rows.append(row[short])
             n += len(short)
             if n + 2 * len(long) > max_facets:
-                raise too_many(max_edge, max_facets)
+                raise too_many(triangles, max_edge, max_facets)
             corners, lengths = _halves(corners.take(long, axis=2), lengths.take(long, axis=1))
             row = np.tile(row[long], 2)
     return np.concatenate(parts), np.concatenate(sizes), np.concatenate(rows)
 
 
-def too_many(max_edge: float, max_facets: int) -> MemoryError:
-    """The error of a cut that would make too many facets."""
+def too_many(triangles: np.ndarray, max_edge: float, max_facets: int) -> MemoryError:
+    """The error of a cut of triangles (k, 3, 3) that would make too many facets."""
     return MemoryError(
-        f"facets no longer than {max_edge:g} m would number more than {max_facets:,}; "
-        "take a smaller scene, a larger max_edge or a coarser resolution"
+        f"facets no longer than {max_edge:g} m would number more than {max_facets:,}; take a smaller scene "
+        f"(this one is {longest_side(triangles):.4g} m long), a larger max_edge or a coarser resolution"
     )
+
+
+def longest_side(triangles: np.ndarray) -> float:
+    """Longest side of the box about triangles (k, 3, 3), m, by which refusals show a mesh in another unit."""
+    return float(np.ptp(triangles.reshape(-1, 3), axis=0).max(initial=0.0))
 
 
 def refuse_many(triangles: np.ndarray, max_edge: float, max_facets: int) -> None:
     """MemoryError for most hopeless cuts, before they fill the memory: no facet is larger than the equilateral one."""
     if np.sqrt(areas(triangles).sum() / (max_facets * np.sqrt(3) / 4)) > max_edge:
-        raise too_many(max_edge, max_facets)
+        raise too_many(triangles, max_edge, max_facets)
 
 
 def bisect(triangles: np.ndarray, lengths: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

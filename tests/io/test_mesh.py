@@ -305,3 +305,25 @@ def test_the_unit_that_a_mesh_file_names_is_used_and_said(tmp_path):
     path.write_text(CENTIMETRES.replace('meter="0.01"', 'meter="1"'))
     assert np.ptp(sarcl.Scene.from_mesh(path).triangles[..., 0]) == 501  # metres: nothing to say
     assert np.ptp(sarcl.Scene.from_mesh(box((0, 0, 0))).triangles[..., 0]) == np.ptp(box((0, 0, 0)).vertices[:, 0])
+
+
+@pytest.mark.parametrize(("units", "metres"), [("m", 1), ("cm", 0.01), ("mm", 0.001), ("in", 0.0254), ("ft", 0.3048)])
+def test_the_unit_of_a_mesh_may_be_named(units, metres):
+    import trimesh
+
+    box = trimesh.creation.box(extents=(4200.0, 1.0, 1.0))
+    assert np.ptp(sarcl.Scene.from_mesh(box, units=units).triangles[..., 0]) == pytest.approx(4200 * metres, rel=1e-12)
+
+
+def test_a_mesh_of_millimetres_is_told_and_refused_with_its_size():
+    import trimesh
+
+    box = trimesh.creation.box(extents=(4200.0, 1800.0, 1500.0))
+    with pytest.warns(sarcl.SarclWarning, match=r"names no unit.*longest side is 4200 m\. Give units='mm'"):
+        car = sarcl.Scene.from_mesh(box)
+    with pytest.raises(MemoryError, match=r"take a smaller scene \(this one is 4200 m long"):
+        car.split(0.01)
+    with pytest.raises(ValueError, match=r"scale=2\.0 and units='mm' both say how long a unit"):
+        sarcl.Scene.from_mesh(box, scale=2.0, units="mm")
+    with pytest.raises(ValueError, match=r"units.*'km'"):
+        sarcl.Scene.from_mesh(box, units="km")
