@@ -159,7 +159,7 @@ def _focus_method(p: argparse.ArgumentParser) -> None:
     _flag(how, "--dry-run", "print method, time, memory and error, and focus nothing")
     text = "hamming, taylor:SIDELOBE_DB:NBAR such as taylor:35:5, hann, kaiser:8.6 ...; or RANGE,CROSS-RANGE"
     _add(how, "--window", text, window)
-    text = "full angle of the transmit beam, pointed at the grid's centre; range_doppler: of the azimuth beam"
+    text = "full angle of the transmit beam, pointed at the grid's centre"
     _add(how, "--beam DEG", text, degrees)
     text = "map the echoes of a frequency-diverse array first (docs/guide/fda.md)"
     _add(how, "--mapping", text, choices=CHOICES["backproject"]["mapping"])
@@ -176,6 +176,7 @@ def _focus_ground(p: argparse.ArgumentParser) -> None:
     _add(earth, "--side", "side of the track, seen from above", choices=CHOICES["range_doppler"]["side"])
     _add(earth, "--times FIRST LAST", "zero-Doppler times, s", float)
     _add(earth, "--ranges NEAR FAR", "slant ranges, m", float)
+    _add(earth, "--azimuth-beam DEG", "full angle of the azimuth beam about the Doppler centroid", degrees)
     _add(earth, "--doppler HZ|data", "Doppler centroid (default: from the geometry)", doppler)
     _add(earth, "--near HZ", "of --doppler data: the centroid nearest to this (default: geometry's)", float)
     _add(earth, "--doppler-rate HZ/S|data", "Doppler rate (default: from the geometry)", doppler)

@@ -160,7 +160,7 @@ class RangeDopplerKeywords(TypedDict, total=False):
     times: Sequence[float] | None
     ranges: Sequence[float] | None
     spacing: tuple[float | None, float | None] | None
-    beam: float | None
+    azimuth_beam: float | None
     doppler: Literal["geometry", "data"] | float
     near: float | None
     doppler_rate: Literal["geometry", "data"] | float
@@ -509,7 +509,7 @@ def range_doppler(
     times: Sequence[float] | None = None,
     ranges: Sequence[float] | None = None,
     spacing: tuple[float | None, float | None] | None = None,
-    beam: float | None = None,
+    azimuth_beam: float | None = None,
     doppler: Literal["geometry", "data"] | float = "geometry",
     near: float | None = None,
     doppler_rate: Literal["geometry", "data"] | float = "geometry",

@@ -66,7 +66,7 @@ def test_range_doppler_is_the_function(here, capsys):
         "--ranges",
         "999990",
         "1000010",
-        "--beam",
+        "--azimuth-beam",
         "0.3",
         "--doppler",
         "0",

@@ -167,7 +167,7 @@ def range_doppler(draw: Draw) -> None:
     )  # fmt: skip
     options: dict[str, Any] = {"window": inputs.window(draw, n_samples)} if draw.chance(0.5) else {}
     if draw.chance(0.4):
-        options["beam"] = draw.log(1e-3, 0.5)
+        options["azimuth_beam"] = draw.log(1e-3, 0.5)
     if draw.chance(0.2):
         options["doppler"] = draw.pick("data", draw.normal() * speed / wavelength)
     allowed = inputs.tolerance(draw, 1e-6)

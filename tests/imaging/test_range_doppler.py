@@ -197,9 +197,9 @@ def test_an_image_is_saved_and_read(tmp_path):
 
 def test_the_beam_limits_the_rows_and_the_report_knows_the_band():
     raw = points([(0, 0, 0), (5, 60, 0)], aperture=400.0, n=500, reference=4e3)
-    with pytest.raises(ValueError, match=r"PRF|pulse rate.*124\.\d+ Hz, is below the Doppler bandwidth.*beam="):
+    with pytest.raises(ValueError, match=r"PRF|pulse rate.*124\.\d+ Hz, is below the Doppler bandwidth.*azimuth_beam="):
         sarcl.range_doppler(raw)
-    image = sarcl.range_doppler(raw, beam=0.015, tolerance=1e-3, check=True, ranges=(3985, 4025))
+    image = sarcl.range_doppler(raw, azimuth_beam=0.015, tolerance=1e-3, check=True, ranges=(3985, 4025))
     assert image.report.measured_error <= image.report.predicted_error
     for place in ((0, 0, 0), (5, 60, 0)):
         row = int(np.argmin(np.abs(raw.tx[:, 1] - place[1])))  # each point has its own aperture, and carrier
@@ -222,7 +222,7 @@ def test_white_noise_of_strips_has_the_predicted_error(zones, squint, tolerance)
     raw = noise(n=int(length / SPEED * prf), aperture=length, squint=np.arctan(np.tan(squint) / 0.7))
     raw = replace(raw, reference_range=np.full(raw.n_rows, 4e3 / np.cos(squint)))
     image = sarcl.range_doppler(
-        raw, beam=zones * zone, doppler=-hertz * np.sin(squint), side="right", tolerance=tolerance, check=True
+        raw, azimuth_beam=zones * zone, doppler=-hertz * np.sin(squint), side="right", tolerance=tolerance, check=True
     )
     assert image.report.measured_error <= image.report.predicted_error <= tolerance
 
@@ -231,7 +231,7 @@ def test_white_noise_of_strips_has_the_predicted_error(zones, squint, tolerance)
 def test_a_point_of_a_strip_map_is_as_exact_as_predicted(tolerance, monkeypatch):
     """At the pixels about it, where few random ones would lie: the tapers of the beam weight the rows."""
     raw = points([(0, 0, 0)], aperture=400.0, n=500, n_samples=64, reference=4e3, bandwidth=150e6)
-    options = {"beam": 0.015, "tolerance": tolerance, "ranges": (3990, 4010)}
+    options = {"azimuth_beam": 0.015, "tolerance": tolerance, "ranges": (3990, 4010)}
     image = sarcl.range_doppler(raw, check=False, **options)
     i, j = np.unravel_index(np.abs(image.data).argmax(), image.data.shape)
     near = tuple(a.ravel() for a in np.mgrid[i - 150 : i + 150 : 3, j - 4 : j + 5 : 2])
@@ -243,8 +243,10 @@ def test_a_point_of_a_strip_map_is_as_exact_as_predicted(tolerance, monkeypatch)
 
 def test_a_track_longer_than_the_times_need_is_folded_and_changes_nothing():
     raw = points([(0, 0, 0), (5, 60, 0), (3, -150, 0)], aperture=800.0, n=1000, reference=4e3)
-    wide = sarcl.range_doppler(raw, beam=0.015, tolerance=1e-3, ranges=(3985, 4025), check=True)
-    narrow = sarcl.range_doppler(raw, beam=0.015, tolerance=1e-3, ranges=(3985, 4025), times=(3.9, 4.1), check=True)
+    wide = sarcl.range_doppler(raw, azimuth_beam=0.015, tolerance=1e-3, ranges=(3985, 4025), check=True)
+    narrow = sarcl.range_doppler(
+        raw, azimuth_beam=0.015, tolerance=1e-3, ranges=(3985, 4025), times=(3.9, 4.1), check=True
+    )
     assert int(narrow.report.plan["Doppler bins"].split()[-1]) < raw.n_rows
     assert narrow.report.measured_error <= narrow.report.predicted_error <= 1e-3
     at = np.array([0.0, 0.0, 0.0])
@@ -289,7 +291,7 @@ def test_the_centroid_of_data_is_the_right_multiple_of_the_pulse_rate_or_doubted
     )  # fmt: skip
 
     def centroid(raw, **options):
-        forecast = sarcl.plan(sarcl.range_doppler, raw, side="right", doppler="data", beam=0.004, **options)
+        forecast = sarcl.plan(sarcl.range_doppler, raw, side="right", doppler="data", azimuth_beam=0.004, **options)
         return float(forecast.plan["Doppler centroid"].split()[0])
 
     rate = (told.n_rows - 1) / float(told.time[-1] - told.time[0])
@@ -461,7 +463,7 @@ def test_squinted_orbits_have_doppler_frequencies_of_the_effective_velocity(side
     raw = sarcl.echo(sarcl.Scene.points([place]), chirp, track, range_window=(-80, 80), check=False)
     random = np.random.default_rng(1).standard_normal((2, *raw.samples.shape)).astype(np.float32)
     noisy = replace(raw, samples=random[0] + 1j * random[1])
-    image = sarcl.range_doppler(noisy, side=side, beam=beam, tolerance=5e-2, check=True)
+    image = sarcl.range_doppler(noisy, side=side, azimuth_beam=beam, tolerance=5e-2, check=True)
     assert image.report.measured_error <= image.report.predicted_error
     assert image.grid.times[0] < 2.0 < image.grid.times[-1]
     wanted = float(ORBIT.view(0.0, place).doppler(5.4e9))
@@ -558,7 +560,7 @@ REFUSED = {
     "doppler": (lambda: RAW, {"doppler": "guess"}, "doppler is 'guess'"),
     "two centroids": (lambda: RAW, {"doppler": np.array([1.0, 2.0])}, "doppler must be a number"),
     "two rates": (lambda: RAW, {"doppler_rate": np.array([-1.0, 2.0])}, "doppler_rate must be a number"),
-    "beam in degrees": (lambda: RAW, {"beam": 5.0}, "beam is 5 rad.*less than pi: was it in degrees"),
+    "beam in degrees": (lambda: RAW, {"azimuth_beam": 5.0}, "azimuth_beam is 5 rad.*less than pi: was it in degrees"),
     "near end": (lambda: RAW, {"doppler": 6399.0}, "near to the direction of flight"),
     "times": (lambda: RAW, {"times": (1, 0)}, "times is"),
     "spacing": (lambda: RAW, {"spacing": (1, 2, 3)}, "spacing is .* wanted"),
@@ -568,7 +570,7 @@ REFUSED = {
     "too large": (lambda: replace(RAW, samples=1e36 * RAW.samples), {}, "scale the samples down"),
     "other ranges": (lambda: RAW, {"ranges": (3980.0, 4300.0)}, r"range window.*is too small for slant ranges"),
     "underground": (lambda: RAW, {"ranges": (2000.0, 4000.0)}, "the ground is 28.* m from the track"),
-    "beam elsewhere": (lambda: RAW, {"beam": 0.001, "times": (3, 3.1)}, "no row sees the times"),
+    "beam elsewhere": (lambda: RAW, {"azimuth_beam": 0.001, "times": (3, 3.1)}, "no row sees the times"),
     "silent": (lambda: replace(RAW, samples=0 * RAW.samples), {"doppler": "data"}, "have no Doppler centroid"),
     "migration": (
         lambda: points([(0, 0, 0)], n_samples=8, reference=4e3, aperture=700.0, n=9000), {"side": "right"}, "migration"

@@ -33,10 +33,12 @@ def noise(n=200, n_samples=80, aperture=90.0, squint=0.0, bandwidth=150e6):
 CASES = {
     "one range block": ({}, {"tolerance": 1e-2}),
     "several range blocks": ({"squint": 0.4, "n": 300}, {"tolerance": 1e-4}),
-    "beam": ({"n": 300, "aperture": 150.0}, {"tolerance": 1e-2, "beam": 0.012}),
-    "beam with a window": ({"n": 300, "aperture": 150.0}, {"tolerance": 1e-2, "beam": 0.012, "window": "hamming"}),
+    "beam": ({"n": 300, "aperture": 150.0}, {"tolerance": 1e-2, "azimuth_beam": 0.012}),
+    "beam with a window": (
+        {"n": 300, "aperture": 150.0}, {"tolerance": 1e-2, "azimuth_beam": 0.012, "window": "hamming"},
+    ),
     "track longer than the FFT": (
-        {"n": 700, "aperture": 350.0}, {"tolerance": 1e-2, "beam": 0.012, "times": (1.7, 1.75)},
+        {"n": 700, "aperture": 350.0}, {"tolerance": 1e-2, "azimuth_beam": 0.012, "times": (1.7, 1.75)},
     ),
 }  # fmt: skip
 SLOW = "several range blocks", "beam", "beam with a window", "track longer than the FFT"

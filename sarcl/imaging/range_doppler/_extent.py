@@ -90,7 +90,7 @@ def choose_extent(view: View, options: RangeDopplerOptions, allowed: float) -> E
             f"the Doppler centroid is {np.degrees(np.arcsin(np.clip(centroid, -1, 1))):.3g} degrees from broadside, "
             f"too near to the direction of flight; {REMEDY}"
         )
-    beam, ranges, has_beam = options.beam, options.ranges, options.beam is not None
+    beam, ranges, has_beam = options.azimuth_beam, options.ranges, options.azimuth_beam is not None
     wide = pair("spacing", (None, None) if options.spacing is None else options.spacing)
     steps = [None if d is None else number(f"spacing[{i}]", d, above=0) for i, d in enumerate(wide)]
     at_middle = float(raw.reference_range[raw.n_rows // 2]) * np.sqrt(1 - centroid**2)
@@ -220,7 +220,7 @@ def _check_pulse_rate(sight: _Sight, pixel_band: float) -> None:
         what = "all rows see a pixel under" if sight.beam is None else "the beam has"
         raise ValueError(
             f"the pulse rate, {sight.rate:.5g} Hz, is below the Doppler bandwidth: {what} "
-            f"{sight.hertz * pixel_band:.5g} Hz; give echoes of at least that pulse rate, or beam= of at most "
+            f"{sight.hertz * pixel_band:.5g} Hz; give echoes of at least that pulse rate, or azimuth_beam= of at most "
             f"{most:.2g} rad if the antenna sees no more"
         )
 
@@ -253,7 +253,8 @@ def _warn_of_ambiguities(sight: _Sight, image_band: float, width: float) -> None
         away = sight.rate / sight.hertz * sight.about
         warn(
             f"the image spans {sight.hertz * image_band:.5g} Hz of Doppler, more than the pulse rate of "
-            f"{sight.rate:.5g} Hz: a point appears again {away:.4g} m along the track. Give fewer times=, or beam="
+            f"{sight.rate:.5g} Hz: a point appears again {away:.4g} m along the track. Give fewer times=, or "
+            "azimuth_beam="
         )
     unambiguous = SPEED_OF_LIGHT * sight.track.step / 2
     if width > unambiguous:

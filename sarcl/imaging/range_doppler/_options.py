@@ -70,11 +70,11 @@ class RangeDopplerOptions(FocusOptions):
         "(s, m) between rows and columns, or None for either: the spectrum of a pixel then fills 0.8 of the sampling "
         "rate at most. Rows are a whole fraction of the pulse interval apart, no farther than asked",
     )
-    beam: float | None = option(
+    azimuth_beam: float | None = option(
         None,
-        "the azimuth beam, full angle in rad about the Doppler centroid: rows that see a pixel outside it do not "
-        "contribute; None: all rows contribute to every pixel. Its ends are tapered, beyond the angle without a window "
-        "along the track (the log and the report say how much that is), else within it",
+        "full angle in rad about the Doppler centroid: rows that see a pixel outside it do not contribute; None: all "
+        "rows contribute to every pixel. Its ends are tapered, beyond the angle without a window along the track (the "
+        "log and the report say how much that is), else within it",
         or_none(_beam),
     )
     doppler: Literal["geometry", "data"] | float = option(

@@ -13,7 +13,7 @@ from ._track import Track
 from ._velocity import Hyperbolas, Positions, hyperbolas
 
 ROWS, RANGES = 257, 513  # rows and ranges that are examined
-REMEDY = "give echoes of a wider range window, fewer times=, or a beam="
+REMEDY = "give echoes of a wider range window, fewer times=, or an azimuth_beam="
 
 
 @dataclass(frozen=True, eq=False)

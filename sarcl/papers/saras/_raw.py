@@ -99,7 +99,7 @@ def _show_image(out: Section, lab: Lab, raw: PhaseHistory, track: Trajectory) ->
     assert track.velocities is not None
     closest = track.known_times[0] + (np.array([-half, half]) - track.positions[0, 1]) / track.velocities[0, 1]
     image = range_doppler(
-        compress(raw), beam=1.5 * WIDTH, side="right", tolerance=1e-2, window="hamming", check=False,
+        compress(raw), azimuth_beam=1.5 * WIDTH, side="right", tolerance=1e-2, window="hamming", check=False,
         times=closest, ranges=(middle - across, middle + across), device=lab.device,
     )  # fmt: skip
     power = np.abs(np.asarray(image.data)) ** 2

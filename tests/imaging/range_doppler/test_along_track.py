@@ -32,14 +32,16 @@ def test_sums_are_those_of_the_equation(n, sign):
     assert np.linalg.norm(found - exact) <= 4e-7 * np.linalg.norm(exact)
 
 
-@pytest.mark.parametrize("options", [{}, {"spacing": (1e-4, None)}, {"beam": 0.003, "window": "hamming"}], ids=str)
+@pytest.mark.parametrize(
+    "options", [{}, {"spacing": (1e-4, None)}, {"azimuth_beam": 0.003, "window": "hamming"}], ids=str
+)
 def test_images_by_sums_are_those_by_ffts(options, monkeypatch):
     raw, asked = few_rows(), []
     pays = FocusPlan.sums_pay
     monkeypatch.setattr(FocusPlan, "sums_pay", lambda *given: asked.append(pays(*given)) or asked[-1])
     image = sarcl.range_doppler(raw, side="right", check=False, **options)
     assert asked == [True, True]
-    assert image_error(image, raw, most=100) <= image.report.predicted_error if "beam" not in options else True
+    assert image_error(image, raw, most=100) <= image.report.predicted_error if "azimuth_beam" not in options else True
     monkeypatch.setattr(FocusPlan, "sums_pay", lambda *given: False)
     wanted = sarcl.range_doppler(raw, side="right", check=False, **options)
     assert np.linalg.norm(image.data - wanted.data) <= 2e-6 * np.linalg.norm(wanted.data)

@@ -14,7 +14,7 @@ from sarcl.imaging.range_doppler import _map_drift
 from sarcl.reference import map_drift as twin
 
 WAVE = SPEED_OF_LIGHT / 9.6e9
-STRIP = {"beam": 0.015, "ranges": (3985, 4015)}
+STRIP = {"azimuth_beam": 0.015, "ranges": (3985, 4015)}
 SCATTER = np.random.default_rng(0).uniform(-1, 1, (20, 2)) * [12.0, 60.0]
 
 

@@ -18,7 +18,7 @@ from sarcl.numerics import windows
 TAYLOR = ("taylor", 35, 5)
 SPEED = 75.0  # of strip_map, m/s
 HERTZ = 2 * SPEED * strip_map.CARRIER / SPEED_OF_LIGHT
-BEAM = {"beam": strip_map.ANGLE, "doppler": HERTZ * np.sin(strip_map.SQUINT), "side": "right"}
+BEAM = {"azimuth_beam": strip_map.ANGLE, "doppler": HERTZ * np.sin(strip_map.SQUINT), "side": "right"}
 ZONE = 0.002
 
 
@@ -100,7 +100,9 @@ def test_white_noise_has_the_predicted_error_with_windows(window, zones, toleran
     tx = np.stack([np.full(n, -2.8e3), np.linspace(-length / 2, length / 2, n), np.full(n, 2.856e3)], axis=1)
     raw = noise_on(tx, n_samples=48, bandwidth=150e6, seed=1, time=np.arange(n) * length / n / 100)
     raw = replace(raw, reference_range=np.full(n, 4e3))
-    image = sarcl.range_doppler(raw, beam=zones * zone, side="right", tolerance=tolerance, window=window, check=True)
+    image = sarcl.range_doppler(
+        raw, azimuth_beam=zones * zone, side="right", tolerance=tolerance, window=window, check=True
+    )
     assert 0.01 * tolerance < image.report.measured_error <= image.report.predicted_error <= tolerance
 
 
@@ -108,7 +110,8 @@ def test_where_every_row_sees_every_pixel_the_window_is_that_of_the_rows(raw):
     lit = raw[500:700]
     options = {"window": "hamming", "times": (19.0, 20.0), "ranges": (9980, 10020), "spacing": (0.004, 1.0)}
     wide, plain = (
-        sarcl.range_doppler(lit, side="right", doppler=0.0, beam=beam, check=False, **options) for beam in (1.0, None)
+        sarcl.range_doppler(lit, side="right", doppler=0.0, azimuth_beam=beam, check=False, **options)
+        for beam in (1.0, None)
     )
     assert np.linalg.norm(wide.data - plain.data) < 1e-2 * np.linalg.norm(plain.data)
     assert wide.gain == pytest.approx(128 * 0.54**2 * 200, rel=1e-6) == plain.gain
@@ -144,7 +147,7 @@ def test_points_at_the_end_of_a_strip_are_as_bright_as_in_its_middle():
             samples, frequency=frequency[0], frequency_step=150e6 / 128, tx=tx, reference_range=4e3,
             time=np.arange(500) * 400 / 499 / 100,
         )  # fmt: skip
-        return sarcl.range_doppler(raw, beam=0.015, window=(None, "hann"), ranges=(3985, 4025), side="right")
+        return sarcl.range_doppler(raw, azimuth_beam=0.015, window=(None, "hann"), ranges=(3985, 4025), side="right")
 
     positions = image([np.zeros(3)]).grid.positions  # points in the middle of pixels
     rows, column = (len(positions) // 50, len(positions) // 2), positions.shape[1] // 2
