@@ -12,6 +12,7 @@ For other folders:
     forecast      Forecast: what a verb would do; Plan: what it carries out
     host_memory   memory of the machine, and arrays in temporary files
     morton        Morton order: neighbours in space become neighbours in memory
+    notebook      tables of objects for notebooks
     options       records of options: type, default, check and documentation of each
     progress      progress bar for verbs: echo(..., progress=Bar())
     report        Report: plan, errors, counts and seconds of a verb

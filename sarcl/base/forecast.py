@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from math import isnan
 from typing import Generic, Protocol, TypeVar
 
+from .notebook import NotebookTable
 from .report import ErrorTerm
 from .text import duration, size_text
 
@@ -15,7 +16,7 @@ R_co = TypeVar("R_co", covariant=True)
 
 
 @dataclass(frozen=True, eq=False)
-class Forecast(Generic[R_co]):
+class Forecast(NotebookTable, Generic[R_co]):
     """Forecast of a verb with the same arguments: `sarcl.plan(verb, ...)` makes it.
 
     method           such as "direct", "factorized", "polar format", "range-Doppler", "pulse by pulse", "full wave";
@@ -55,6 +56,19 @@ class Forecast(Generic[R_co]):
         """(predicted error, seconds) of the next cheaper plan, which is planned when it is first asked for; None: none,
         or the verb searches for none."""
         return self.search_cheaper()
+
+    def _notebook_rows(self) -> Iterator[tuple[str, str]]:
+        yield "method", self.method
+        if self.n_rows is not None:
+            yield "result", f"{self.n_rows} rows of {self.n_samples} samples"
+        yield "time, memory", f"about {duration(self.seconds)}, {size_text(self.bytes)}"
+        yield "error", "known after the run" if isnan(self.predicted_error) else f"below {self.predicted_error:.1e}"
+        yield from ((f"of which {term.name}", f"{term.value:.1e}: {term.remedy}") for term in self.error_terms)
+        if self.cheaper:
+            yield "next cheaper plan", f"{self.cheaper[0]:.1e} in {duration(self.cheaper[1])}"
+        yield "plan", ", ".join(f"{name} {value}" for name, value in self.plan.items())
+        if self.work:
+            yield "work", self.work
 
     def __str__(self) -> str:
         rows = "" if self.n_rows is None else f"{self.n_rows} rows of {self.n_samples} samples, "

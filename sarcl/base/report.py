@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from types import MappingProxyType
 from typing import Any
+
+from .notebook import NotebookTable
 
 SHOWN = 1e-2  # of the predicted error: smaller terms are left out of the text of a report
 SMALLER_TOLERANCE = "a smaller tolerance"  # the remedy of an error term that a plan makes as large as it may be
@@ -40,7 +42,7 @@ def terms_of_sum(errors: Mapping[str, float], remedy: str = SMALLER_TOLERANCE) -
 
 
 @dataclass(frozen=True, eq=False)
-class Report:
+class Report(NotebookTable):
     """How a result was computed.
 
     plan                   the choices made, name -> value
@@ -89,21 +91,21 @@ class Report:
         plain["error_terms"] = tuple(asdict(term) for term in self.error_terms)
         return {k: dict(v) if isinstance(v, MappingProxyType) else v for k, v in plain.items()}
 
-    def __str__(self) -> str:
-        lines = [f"device      {self.device}"]
-        lines.append("plan        " + ", ".join(f"{k} {v}" for k, v in self.plan.items()))
+    def _notebook_rows(self) -> Iterator[tuple[str, str]]:
+        yield "device", self.device
+        yield "plan", ", ".join(f"{k} {v}" for k, v in self.plan.items())
         error = "not measured" if self.measured_error is None else f"{self.measured_error:.1e} measured"
-        lines.append(f"error       {self.tolerance:.1e} asked, {self.predicted_error:.1e} predicted, {error}")
+        yield "error", f"{self.tolerance:.1e} asked, {self.predicted_error:.1e} predicted, {error}"
         terms = [term for term in self.error_terms if term.value >= SHOWN * self.predicted_error]
         if len(terms) > 1:
-            lines.append("of which    " + ", ".join(f"{term.name} {term.value:.1e}" for term in terms))
+            yield "of which", ", ".join(f"{term.name} {term.value:.1e}" for term in terms)
         if self.model_error is not None:
-            lines.append(f"model       {self.model_error:.1e} predicted for the model itself")
+            yield "model", f"{self.model_error:.1e} predicted for the model itself"
         if self.predicted_error > 0:
-            lines.append(
-                f"contrast    trusted down to {self.dynamic_range_db:.0f} dB below what is bright in the same rows"
-            )
-        lines.append(f"done        {self.contributions_done:.3e} contributions")
-        lines += [f"skipped     {n:.3e} {why}" for why, n in self.contributions_skipped.items() if n]
-        lines.append("seconds     " + ", ".join(f"{k} {v:.2f}" for k, v in self.seconds.items()))
-        return "\n".join(lines)
+            yield "contrast", f"trusted down to {self.dynamic_range_db:.0f} dB below what is bright in the same rows"
+        yield "done", f"{self.contributions_done:.3e} contributions"
+        yield from (("skipped", f"{n:.3e} {why}") for why, n in self.contributions_skipped.items() if n)
+        yield "seconds", ", ".join(f"{k} {v:.2f}" for k, v in self.seconds.items())
+
+    def __str__(self) -> str:
+        return "\n".join(f"{name:<12}{value}" for name, value in self._notebook_rows())

@@ -90,6 +90,8 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
         ) -> None: ...
 
     def __post_init__(self) -> None:
+        if isinstance(self.data, Image):
+            raise TypeError("image data is an Image; give its pixels (image.data), or dataclasses.replace(image, ...)")
         if isinstance(self.data, (list, tuple)):
             validation.ndim("image data", self.data)
             object.__setattr__(self, "data", np.asarray(self.data))
@@ -140,6 +142,21 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
             gain = self.gain[slices] if isinstance(self.gain, np.ndarray) else self.gain
             return replace(self, data=self.data[slices], grid=self.grid.part(*slices), gain=gain)
         return self.data[index] if isinstance(self.data, np.ndarray) else np.asarray(self)[index]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of the data, that of the grid."""
+        return tuple(self.grid.shape)
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """Number type of the data."""
+        return np.dtype(self.data.dtype)
+
+    @property
+    def ndim(self) -> int:
+        """Number of axes of the data."""
+        return len(self.grid.shape)
 
     @property
     def extent(self) -> tuple[float, float, float, float]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal, Unpack
 
@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base import arguments, constants, validation
+from ..base.notebook import NotebookTable, interval
 from ..base.report import Report
+from ..base.text import size_text
 from ..io import formats, hdf5
 from ._row_fields import LEAST_STEP, PER_ROW, RowFields, check_axis, one_per_row
 from .lazy_rows import in_memory, pick
@@ -23,7 +25,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class PhaseHistory:
+class PhaseHistory(NotebookTable):
     """Echoes s (n_rows, n_samples); a row is one (pulse, transmit channel, receive channel, polarisation).
 
     samples          complex; an array, memmap, HDF5 dataset or anything with shape, dtype and row slicing.
@@ -87,6 +89,10 @@ class PhaseHistory:
         ) -> None: ...
 
     def __post_init__(self) -> None:
+        if isinstance(self.samples, PhaseHistory):
+            raise TypeError(
+                "samples is a PhaseHistory; give its samples (raw.samples), or dataclasses.replace(raw, ...)"
+            )
         samples = validation.unmasked("samples", self.samples)
         if isinstance(samples, (list, tuple)) or (in_memory(samples) and samples.dtype.kind in "iuf"):
             samples = validation.sealed(validation.converted("samples", samples, np.complex128))
@@ -246,6 +252,41 @@ class PhaseHistory:
             f"PhaseHistory({self.n_rows} rows of {self.n_samples} {self.samples.dtype} samples, "
             f"{low:.6g} to {high:.6g} GHz, swath {self.swath.min():.4g} m{state})"
         )
+
+    def _notebook_rows(self) -> Iterator[tuple[str, str]]:
+        yield "samples", f"{self.n_rows} rows of {self.n_samples}, {self.samples.dtype}, {size_text(self.nbytes)}"
+        ends = self.frequency.min(), (self.frequency + (self.n_samples - 1) * self.frequency_step).max()
+        yield "frequencies", interval((f / 1e9 for f in ends), "GHz")
+        yield "resolution in range", interval(constants.SPEED_OF_LIGHT / (2 * self.bandwidth), "m", 4)
+        yield "swath", interval(self.swath, "m", 4)
+        yield "reference range", interval(self.reference_range, "m")
+        if self.time is not None:
+            yield "times", interval(self.time, "s", 9)
+        for name in ("polarization", "tx_channel", "rx_channel"):
+            if getattr(self, name) is not None:
+                yield name, ", ".join(map(str, np.unique(getattr(self, name))))
+        yield "antennas", "one for both" if np.array_equal(self.tx, self.rx) else "apart"
+        yield "compressed", "yes" if self.compressed else "no: sarcl.compress(raw)"
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(n_rows, n_samples), as of an array."""
+        return self.n_rows, self.n_samples
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """Number type of the samples."""
+        return np.dtype(self.samples.dtype)
+
+    @property
+    def ndim(self) -> int:
+        """2: rows and samples."""
+        return 2
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the samples, in memory or in a file."""
+        return self.n_rows * self.n_samples * self.dtype.itemsize
 
     @property
     def n_rows(self) -> int:

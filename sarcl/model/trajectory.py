@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -9,12 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base import arguments, validation
+from ..base.notebook import NotebookTable, interval
 
 BYTES_PER_PULSE = 80  # time, position and velocity, and what they are made of
 
 
 @dataclass(frozen=True, eq=False)
-class Trajectory:
+class Trajectory(NotebookTable):
     """Positions of an antenna's phase centre, one per pulse.
 
     times          s (n,), increasing; or None where they are not known: then there are no velocities either
@@ -85,6 +87,25 @@ class Trajectory:
         fields_text = "".join(f", {name}" for name in optional if getattr(self, name) is not None)
         motion = "" if self.stop_and_go else ", not stop-and-go"
         return f"Trajectory({len(self)} pulses {times}, from {first} to {last} m{fields_text}{motion})"
+
+    def _notebook_rows(self) -> Iterator[tuple[str, str]]:
+        yield "pulses", f"{len(self)}"
+        steps = np.linalg.norm(np.diff(self.positions, axis=0), axis=1)
+        if self.times is not None:
+            first, last = self.times[0], self.times[-1]
+            rate = f", {(len(self) - 1) / (last - first):.6g} Hz" if len(self) > 1 else ""
+            yield "times", f"{interval((first, last), 's', 9)}{rate}"
+            if len(self) > 1:
+                yield "speed", interval(steps / np.diff(self.times), "m/s")
+        yield "from", f"({', '.join(f'{x:.6g}' for x in self.positions[0])}) m"
+        yield "to", f"({', '.join(f'{x:.6g}' for x in self.positions[-1])}) m"
+        yield "length", f"{steps.sum():.6g} m"
+        known = [n for n in ("velocities", "attitude", "accelerations") if getattr(self, n) is not None]
+        yield "also known", ", ".join(known) or "nothing"
+        yield "while a pulse travels", "the antenna rests" if self.stop_and_go else "the antenna moves"
+
+    def __str__(self) -> str:
+        return "\n".join(["Trajectory", *(f"  {name:<23}{value}" for name, value in self._notebook_rows())])
 
     @property
     def known_times(self) -> NDArray[np.float64]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..base import validation
 from ..base.boxes import box
+from ..base.notebook import NotebookTable, interval
 from . import _changes, terrain
 from . import triangles as geometry
 from ._kept import Kept
@@ -29,7 +30,7 @@ log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class Scene(NotebookTable):
     """Point scatterers and triangular facets in one Cartesian frame, m. Scenes add: ``ground + tank``.
 
     positions        points, m (n, 3)
@@ -313,6 +314,15 @@ class Scene:
     def __repr__(self) -> str:
         size = " x ".join(f"{s:.4g}" for s in self.bounds[1] - self.bounds[0])
         return f"Scene({len(self.positions)} points, {len(self.triangles)} facets, {size} m)"
+
+    def _notebook_rows(self) -> Iterator[tuple[str, str]]:
+        yield "points", f"{len(self.positions)}"
+        yield "facets", f"{len(self.triangles)}"
+        yield from ((axis, interval(ends, "m")) for axis, ends in zip("xyz", self.bounds.T, strict=True))
+        counts = np.bincount(self.material, minlength=len(self.materials))
+        for material, count in zip(self.materials, counts, strict=True):
+            if count:
+                yield f"facets of {material.name}", f"{count}"
 
     def __add__(self, other: Scene) -> Scene:
         if not isinstance(other, Scene):

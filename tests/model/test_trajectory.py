@@ -104,13 +104,13 @@ def test_the_callers_arrays_are_neither_frozen_nor_followed():
             getattr(track, name)[0] = 0
 
 
-def test_a_track_prints_in_a_line_whatever_its_length():
+def test_the_repr_of_a_track_is_a_line_whatever_its_length():
     long = sarcl.Trajectory(None, np.linspace([0, -30, 1e3], [0, 30, 1e3], 500))
     assert repr(long) == "Trajectory(500 pulses without times, from (0, -30, 1000) to (0, 30, 1000) m)"
     timed = sarcl.Trajectory(
         np.arange(600) / 300, np.ones((600, 3)), np.ones((600, 3)), np.tile(np.eye(3), (600, 1, 1))
     )
-    assert str(timed) == ("Trajectory(600 pulses over 1.99667 s, from (1, 1, 1) to (1, 1, 1) m, velocities, attitude)")
+    assert repr(timed) == ("Trajectory(600 pulses over 1.99667 s, from (1, 1, 1) to (1, 1, 1) m, velocities, attitude)")
     moving = sarcl.Trajectory([0, 1], np.ones((2, 3)), np.ones((2, 3)), None, np.ones((2, 3)), stop_and_go=False)
     assert repr(moving).endswith("m, velocities, accelerations, not stop-and-go)")
 
