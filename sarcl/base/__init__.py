@@ -12,13 +12,12 @@ For other folders:
     forecast      Forecast: what a verb would do; Plan: what it carries out
     host_memory   memory of the machine, and arrays in temporary files
     morton        Morton order: neighbours in space become neighbours in memory
-    notebook      tables of objects for notebooks
     options       records of options: type, default, check and documentation of each
     progress      progress bar for verbs: echo(..., progress=Bar())
     report        Report: plan, errors, counts and seconds of a verb
     rows          some rows spread over all, and groups of rows by keys
     stage_timer   seconds per stage of a computation
-    text          bytes, durations, tolerances and spelling suggestions as text for messages
+    text          bytes, durations, tolerances and spelling suggestions for messages; tables for notebooks
     threads       how many processors computations of this process use, and NumPy on all of them
     tolerances    tolerances that a refusal names: rounded up, and tried until one is met
     types         types of arguments that several rooms take

@@ -8,9 +8,8 @@ from dataclasses import dataclass, field
 from math import isnan
 from typing import Generic, Protocol, TypeVar
 
-from .notebook import NotebookTable
 from .report import ErrorTerm
-from .text import duration, size_text
+from .text import NotebookTable, duration, size_text
 
 R_co = TypeVar("R_co", covariant=True)
 

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, field
 from types import MappingProxyType
 from typing import Any
 
-from .notebook import NotebookTable
+from .text import NotebookTable
 
 SHOWN = 1e-2  # of the predicted error: smaller terms are left out of the text of a report
 SMALLER_TOLERANCE = "a smaller tolerance"  # the remedy of an error term that a plan makes as large as it may be

@@ -82,7 +82,7 @@ def simulate(args: argparse.Namespace, job: Job) -> int:
     output = args.output or f"{stem}_raw.h5"
     images = args.image or ([f"{stem}.png"] if scenario.has_image else [])
     job.expect_named([output], formats.writing("phase history"), [args.scenario])
-    job.expect_named(images, formats.writing("picture", "image"), [args.scenario, output])
+    job.expect_named(images, formats.writing(*formats.OF_IMAGES), [args.scenario, output])
     _check_scale(args)
     grid = scenario.build_grid() if scenario.grid is not None else None
     devices = open_devices(args.device)
@@ -134,7 +134,7 @@ def focus(args: argparse.Namespace, job: Job) -> int:
     outputs = args.output or [f"{Path(args.raw[0]).stem}.png"]
     method = Method.of(args)
     check_pieces(args, outputs)
-    job.expect_named(outputs, formats.writing("picture", "image"), [*args.raw, *([args.grid] if args.grid else [])])
+    job.expect_named(outputs, formats.writing(*formats.OF_IMAGES), [*args.raw, *([args.grid] if args.grid else [])])
     _check_scale(args)
     place = _grid_options(args)
     grid = None if args.grid is None else load(args.grid).build_grid()

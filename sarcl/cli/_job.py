@@ -84,9 +84,9 @@ class Job:
         print(text, flush=True)
 
     def expect(self, path: PathLike, n_bytes: int = 0) -> None:
-        """Register an output path of at least n_bytes; raises what `output_paths.check_writable` raises where it cannot
+        """Register an output path of at least n_bytes; raises what `formats.check_writable` raises where it cannot
         be written."""
-        output_paths.check_writable(path, n_bytes)
+        formats.check_writable(path, n_bytes)
         self.outputs[str(path)] = identity(path)
 
     def expect_named(self, paths: list[str], among: list[formats.Format], inputs: list[str], n_bytes: int = 0) -> None:

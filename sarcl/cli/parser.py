@@ -57,7 +57,7 @@ def _add(group: Any, words: str, text: str, kind: Callable[[str], object] | None
 
 def _image_endings() -> str:
     """Endings of files that images are written to."""
-    return formats.suggested(formats.writing("picture", "image"))
+    return formats.suggested(formats.writing(*formats.OF_IMAGES))
 
 
 def _flag(group: object, words: str, text: str) -> None:

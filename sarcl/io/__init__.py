@@ -6,6 +6,7 @@ For other folders:
     formats        table of the file formats of phase histories and images: names, first bytes, reader, writers
     hdf5           plain values, arrays and reports in HDF5
     input_paths    input files: regular files that can be read, named where they are not
+    labelled_files  images as Zarr stores and NetCDF files, and the package xarray
     mesh           meshes through trimesh: triangles, names of parts, repaired
     orbit_files    state vectors of orbit files in XML
     output_paths   output files: checked before the computation, written completely or not at all

@@ -20,7 +20,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from ..base import arguments
-from . import input_paths
+from . import input_paths, output_paths
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -28,7 +28,8 @@ if TYPE_CHECKING:
     from ..base.types import PathLike
 
 Kind = Literal["phase history", "image"]
-Written = Literal["phase history", "image", "picture"]
+Written = Literal["phase history", "image", "picture", "dataset"]
+OF_IMAGES: tuple[Written, ...] = ("picture", "image", "dataset")  # what is written of an image
 T = TypeVar("T")
 Make = Callable[[Kind, Mapping[str, Any]], T]
 
@@ -41,7 +42,7 @@ class Format:
     starts     first bytes of its files; none where the format is not read
     name       for the list of what can be read
     file       the file of this folder that reads and writes it; none where other rooms do
-    writes     what can be written: "picture" is made of an image by sarcl/figures
+    writes     what can be written: "picture" is made of an image by sarcl/figures, "dataset" by sarcl/model/_labelled
     by_blocks  True where an image can be written block by block, and a killed run go on
     """
 
@@ -58,6 +59,11 @@ class Format:
         return import_module(f".{self.file}", __package__)
 
     @property
+    def is_dataset(self) -> bool:
+        """True where an image's dataset of xarray is written."""
+        return "dataset" in self.writes
+
+    @property
     def is_picture(self) -> bool:
         """True where an image's grey picture is written, not its numbers."""
         return "picture" in self.writes
@@ -71,10 +77,14 @@ HDF5 = Format(
     writes=("phase history", "image"),
     by_blocks=True,
 )
+# recognised by their content: a folder, and HDF5 of another kind
+ZARR, NETCDF = (Format((ending,), file="labelled_files", writes=("dataset",)) for ending in (".zarr", ".nc"))
 FORMATS = (
     Format((".png",), writes=("picture",)),
     HDF5,
     Format((".mat",), b"MATLAB 5.0 MAT-file", "AFRL Gotcha .mat files (MATLAB 5)", "_gotcha"),
+    ZARR,
+    NETCDF,
 )
 NOT_READ = {  # first bytes of files that are often met, and what to say of them
     b"MATLAB 7.3": "is a MATLAB 7.3 file (save it again with -v7)",
@@ -89,6 +99,8 @@ def load(path: Path, make: Make[T], autofocus: bool = False, external: bool = Fa
     ValueError for a file that is of no known format, truncated or damaged, or a pipe; FileNotFoundError,
     IsADirectoryError, PermissionError.
     """
+    if is_zarr(path):
+        return ZARR.functions.load(path, make)
     head = input_paths.head(path, folder="give the files in it, e.g. sorted(Path(folder).glob('*.mat'))")
     form = next((f for f in FORMATS if f.starts and head.startswith(f.starts)), None)
     if form is not None:
@@ -98,6 +110,17 @@ def load(path: Path, make: Make[T], autofocus: bool = False, external: bool = Fa
     is_named_so = any(path.suffix.lower() in f.endings for f in FORMATS if f.starts)
     although = f" although its name ends in {path.suffix!r}" if is_named_so else ""
     raise ValueError(f"{str(path)!r} {next(unreadable, unknown)}{although}; sarcl reads {readable('and')}")
+
+
+def is_zarr(path: Path) -> bool:
+    """Whether a path is a folder that holds a Zarr store, of version 3 or 2."""
+    return path.is_dir() and any((path / name).is_file() for name in ("zarr.json", ".zgroup"))
+
+
+def check_writable(path: PathLike, n_bytes: int = 0) -> None:
+    """Raises what writing a file of this name would, as far as that can be known before."""
+    form = named(path, [ZARR, NETCDF])
+    (output_paths if form is None else form.functions).check_writable(path, n_bytes)
 
 
 def writing(*kinds: Written, by_blocks: bool = False) -> list[Format]:

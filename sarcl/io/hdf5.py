@@ -77,14 +77,24 @@ def get_all(group: h5py.Group, leave: Sequence[str] = ()) -> dict[str, Any]:
 def put_report(file: h5py.File, report: Report | None) -> None:
     """A report as a dataset of JSON text; None not at all."""
     if report is not None:  # a dataset: attributes end at 64 KB
-        file["report"] = json.dumps(_plain(report.to_dict()))
+        file["report"] = report_text(report)
 
 
 def get_report(file: h5py.File) -> Report | None:
     """The report that `put_report` stored, or None."""
+    return report_of(file["report"].asstr()[()]) if "report" in file else None
+
+
+def report_text(report: Report) -> str:
+    """A report as JSON text."""
+    return json.dumps(_plain(report.to_dict()))
+
+
+def report_of(text: str) -> Report:
+    """The report of `report_text`."""
     from ..base.report import Report
 
-    return Report(**_revive(json.loads(file["report"].asstr()[()]))) if "report" in file else None
+    return Report(**_revive(json.loads(text)))
 
 
 def _plain(value: object) -> object:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import _checksums, _hdf5_safety, hdf5
+from . import _checksums, _hdf5_safety, hdf5, labelled_files
 from ._partial_hdf5 import Unfinished
 from .formats import Kind, Make, T
 
@@ -50,6 +50,11 @@ def load(path: PathLike, make: Make[T], autofocus: bool = False, external: bool 
             mark, version = file.attrs.get("sarcl_file"), file.attrs.get("format")
         except (KeyError, OSError, RuntimeError, TypeError, ValueError) as exc:
             raise ValueError(f"{name!r} is damaged: its attributes cannot be read ({exc}); copy it again") from None
+        if "_NCProperties" in file.attrs:  # NetCDF-4
+            if not external:
+                _hdf5_safety.check_links(file)
+            file.close()
+            return labelled_files.load(Path(path), make)
         if not isinstance(mark, str) or mark not in ROWS or version is None:
             raise ValueError(f"{name!r} is HDF5 but not sarcl's (it has no sarcl_file mark); sarcl reads what it saved")
         if np.ndim(version) or version != hdf5.FORMAT:

@@ -24,6 +24,7 @@ For this folder alone:
 
     _costas           Costas permutations by the constructions of Welch and Golomb
     _grid_checks      checks of what an image grid is made of
+    _labelled         images and echoes as datasets of xarray: fields, coordinates, units
     _orbit_arguments  arguments of Orbit: positions, spans of time
     _row_fields       fields of a phase history with one entry per row: types and checks
     _time_record      records of samples in time: checked, with their axes

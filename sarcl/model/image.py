@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from types import EllipsisType
 
     import PIL.Image
+    import xarray
 
     from ..base.types import LazyRows, PathLike
 
@@ -282,6 +283,17 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
             zero="a unit point in focus",
         )
 
+    def to_xarray(self) -> xarray.Dataset:
+        """All fields as an xarray.Dataset (sarcl[xarray]): data (row, column), and the positions of the pixels.
+
+        Coordinates are longitude, latitude and height of Earth-fixed images, else x, y and z, m: one per column and
+        row where the axes are those of the scene. Units are attributes, and so are fields without rows; names of the
+        grid's fields begin with grid_. ImportError names the extra.
+        """
+        from ._labelled import image_dataset
+
+        return image_dataset(self)
+
     def _repr_png_(self) -> bytes | None:
         return self.show()._repr_png_()
 
@@ -294,13 +306,15 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
         top_db: float | None = None,
         percentile: float | None = None,
     ) -> None:
-        """Write "name.png" (the picture of `show`) or "name.h5" (lossless; `sarcl.read` opens it).
+        """Write "name.png" (the picture of `show`), or "name.h5", "name.zarr" or "name.nc", which lose nothing.
+
+        `sarcl.read` opens these. Zarr and NetCDF are the dataset of `to_xarray`, made in memory (sarcl[xarray]).
 
         floor_db, top_db, percentile  of a picture, as in `show`; the PNG's text entries top_db, floor_db and
                                       Description say what white and black are;  title  above the picture
         On any exception `path` is as it was.
         """
-        image_formats = formats.writing("picture", "image")
+        image_formats = formats.writing(*formats.OF_IMAGES)
         form = formats.named(arguments.path("path", path), image_formats)
         if form is None:
             endings = formats.suggested(image_formats, "'")
@@ -310,6 +324,9 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
 
             picture = self.show(floor_db, top_db=top_db, percentile=percentile, title=title)
             write_png(picture, path)
+            return
+        if form.is_dataset:
+            form.functions.write(path, self.to_xarray())
             return
         with form.functions.ImageWriter(path, formats.fields_of(self.grid), self.data.dtype) as writer:
             for a, b in hdf5.blocks(writer.data):

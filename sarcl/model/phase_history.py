@@ -10,14 +10,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base import arguments, constants, validation
-from ..base.notebook import NotebookTable, interval
 from ..base.report import Report
-from ..base.text import size_text
+from ..base.text import NotebookTable, interval, size_text
 from ..io import formats, hdf5
 from ._row_fields import LEAST_STEP, PER_ROW, RowFields, check_axis, one_per_row
 from .lazy_rows import in_memory, pick
 
 if TYPE_CHECKING:
+    import xarray
+
     from ..base.types import LazyRows, PathLike
     from .antenna_array import AntennaArray
     from .trajectory import Trajectory
@@ -267,6 +268,16 @@ class PhaseHistory(NotebookTable):
                 yield name, ", ".join(map(str, np.unique(getattr(self, name))))
         yield "antennas", "one for both" if np.array_equal(self.tx, self.rx) else "apart"
         yield "compressed", "yes" if self.compressed else "no: sarcl.compress(raw)"
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The samples (row, sample) as an xarray.Dataset in memory, with the rows' coordinates (sarcl[xarray]).
+
+        frequency, Hz, is that of each sample, per row where rows differ; tx and rx (row, axis), m. Units are
+        attributes. ImportError names the extra.
+        """
+        from ._labelled import phase_history_dataset
+
+        return phase_history_dataset(self)
 
     @property
     def shape(self) -> tuple[int, int]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base import arguments, validation
-from ..base.notebook import NotebookTable, interval
+from ..base.text import NotebookTable, interval
 
 BYTES_PER_PULSE = 80  # time, position and velocity, and what they are made of
 

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..base import validation
 from ..base.boxes import box
-from ..base.notebook import NotebookTable, interval
+from ..base.text import NotebookTable, interval
 from . import _changes, terrain
 from . import triangles as geometry
 from ._kept import Kept
