@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base import arguments, errors, validation, wgs84
-from . import _other_files, input_paths
+from . import input_paths, other_files
 
 if TYPE_CHECKING:
     from rasterio import DatasetReader
@@ -121,10 +121,10 @@ def _open_raster(path: Path, name: str, external: bool) -> Iterator[DatasetReade
         warnings.simplefilter("ignore", NotGeoreferencedWarning)  # the code below raises an error for it
         try:
             if is_file and not external:
-                _other_files.check_raster(path, name)
+                other_files.check_raster(path, name)
             with rasterio.open(path) as file:
                 if is_file and not external:
-                    _other_files.check_parts(path, file.driver, file.files, name)
+                    other_files.check_parts(path, file.driver, file.files, name)
                 yield file
         # a UnicodeDecodeError comes of GDAL's messages about names in the file
         except (RasterioError, CPLE_BaseError, UnicodeDecodeError) as exc:

@@ -219,7 +219,7 @@ class Scene(NotebookTable):
         matter. Raises FileNotFoundError or ValueError for a file that is missing, unreadable or without faces, and for
         corners that are not finite.
         """
-        from ..io.mesh import load, metres_per_unit, part_materials
+        from ..io.meshes.mesh import load, metres_per_unit, part_materials
 
         position = validation.array("position", position, np.float64, (3,))
         rotate = geometry.rotation(rotation)

@@ -9,7 +9,7 @@ import pytest
 import trimesh
 
 import sarcl
-from sarcl.io.mesh import load
+from sarcl.io.meshes.mesh import load
 from sarcl.scene.material import MATERIALS, METAL
 from sarcl.scene.triangles import areas, normals
 

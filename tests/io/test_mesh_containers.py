@@ -9,7 +9,7 @@ import pytest
 import trimesh
 
 import sarcl
-from sarcl.io import mesh
+from sarcl.io.meshes import mesh
 
 CONCAVE = "is concave or crosses itself, and its triangles are not in the file; export it as triangles"
 CORNERS = [(0, 2), (0, 0), (2, 0), (2, 1), (1, 1), (1, 2)]  # an L

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import sarcl
-from sarcl.io import mesh
+from sarcl.io.meshes import mesh
 
 # a unit cube of two triangles and five squares; its first face is a square, and so is the mean of all of them
 POINTS = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from . import _mesh_checks
+from . import _checks
 
 if TYPE_CHECKING:
     import collada
@@ -76,6 +76,6 @@ def _check_primitive(primitive: collada.primitive.Primitive, where: str) -> None
         raise ValueError(f"{where}: face {face} has {corners[face]} corners, wanted at least 3; {AGAIN}")
     if corners.sum() != len(index):
         raise ValueError(f"{where}: its faces have {corners.sum()} corners, and it holds {len(index)}; {AGAIN}")
-    wrong = _mesh_checks.wrong_fans(corners, index, np.asarray(primitive.vertex))
+    wrong = _checks.wrong_fans(corners, index, np.asarray(primitive.vertex))
     if wrong:
-        raise ValueError(f"{where}: face {wrong[0]}, of {corners[wrong[0]]} corners, {_mesh_checks.CONCAVE}")
+        raise ValueError(f"{where}: face {wrong[0]}, of {corners[wrong[0]]} corners, {_checks.CONCAVE}")

@@ -10,7 +10,8 @@ import zlib
 from collections.abc import Collection
 from pathlib import Path
 
-from . import _mesh_checks, input_paths
+from .. import input_paths
+from . import _checks
 
 KINDS = (".zip", ".zae", ".bz2")
 
@@ -26,9 +27,9 @@ def contents(path: Path, what: str) -> dict[str, bytes]:
             members = [member for member in archive.infolist() if not member.is_dir()]
             files = {member.filename: archive.read(member) for member in members}
     except (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, OSError) as exc:  # RuntimeError: a password
-        raise ValueError(f"{what} cannot be unpacked ({exc}): {_mesh_checks.TAKE}") from None
+        raise ValueError(f"{what} cannot be unpacked ({exc}): {_checks.TAKE}") from None
     if len(files) < len(members):
-        raise ValueError(f"{what} holds {len(members)} files of {len(files)} names: {_mesh_checks.TAKE}")
+        raise ValueError(f"{what} holds {len(members)} files of {len(files)} names: {_checks.TAKE}")
     return files
 
 

@@ -11,19 +11,10 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from ..base import validation
-from ..base.errors import warn
-from . import (
-    _collada_checks,
-    _gltf_checks,
-    _mesh_archive,
-    _mesh_checks,
-    _mesh_repair,
-    _mesh_text,
-    _other_files,
-    _ply,
-    input_paths,
-)
+from ...base import validation
+from ...base.errors import warn
+from .. import input_paths, other_files
+from . import _archive, _checks, _collada_checks, _gltf_checks, _ply, _repair, _text
 
 if TYPE_CHECKING:
     import trimesh
@@ -72,7 +63,7 @@ def load(mesh: object, repair: bool = True, external: bool = False) -> Mesh:
     if len(faces) == 0:
         raise ValueError(f"{what} has no faces; nothing would reflect: check what the file holds")
     validation.finite(f"{what} vertices", vertices)
-    kept, turned, closed = _mesh_repair.repaired(vertices, faces, repair, what)
+    kept, turned, closed = _repair.repaired(vertices, faces, repair, what)
     faces = np.where(turned[:, None], faces[:, ::-1], faces)[kept]
     return Mesh(vertices[faces], part[kept], names, closed, _unit(mesh, what))
 
@@ -128,16 +119,16 @@ def _read(path: Path, what: str, external: bool) -> trimesh.Scene:
     kind = path.suffix.lower()
     if kind.lstrip(".") not in formats:
         raise ValueError(f"{what}: unknown format {path.suffix!r}; known are {', '.join(formats)}")
-    if kind not in _mesh_archive.KINDS:
-        resolver = _other_files.Resolver(path, external)
+    if kind not in _archive.KINDS:
+        resolver = other_files.Resolver(path, external)
         scene = _scene(input_paths.contents(path, "mesh file"), kind, path, what, resolver)
         _check_refused(resolver, what)
         return scene
-    files = _mesh_archive.contents(path, what)
-    names = _mesh_archive.meshes(path, files, trimesh.exchange.load.mesh_formats(), what)
+    files = _archive.contents(path, what)
+    names = _archive.meshes(path, files, trimesh.exchange.load.mesh_formats(), what)
     scenes = []
     for name in names:
-        neighbours = {other: io.BytesIO(data) for other, data in _mesh_archive.beside(files, name).items()}
+        neighbours = {other: io.BytesIO(data) for other, data in _archive.beside(files, name).items()}
         archive = trimesh.resolvers.ZipResolver(neighbours)
         kind, label = Path(name).suffix.lower(), f"{what}, its file {name!r:.100}"
         scenes.append(_scene(files[name], kind, None, label, archive))
@@ -145,7 +136,7 @@ def _read(path: Path, what: str, external: bool) -> trimesh.Scene:
 
 
 def _scene(
-    data: bytes, kind: str, path: Path | None, what: str, others: trimesh.resolvers.Resolver | _other_files.Resolver
+    data: bytes, kind: str, path: Path | None, what: str, others: trimesh.resolvers.Resolver | other_files.Resolver
 ) -> trimesh.Scene:
     """A trimesh.Scene of the bytes of a mesh file; ValueError for what would be left out or covered wrongly.
 
@@ -158,11 +149,11 @@ def _scene(
         scene = trimesh.Scene()
         scene.add_geometry(trimesh.Trimesh(vertices, faces, process=False), geom_name=path.name if path else None)
         return scene
-    declared = _mesh_checks.declared_faces(data, kind, what)
+    declared = _checks.declared_faces(data, kind, what)
     if kind == ".off":
-        _mesh_text.check_off(data, what)
+        _text.check_off(data, what)
     elif kind == ".obj":
-        data = _mesh_text.of_obj(data, what) or data
+        data = _text.of_obj(data, what) or data
     elif kind in (".glb", ".gltf"):
         _gltf_checks.check(data, what)
     elif kind == ".dae" and zipfile.is_zipfile(io.BytesIO(data)):
@@ -177,7 +168,7 @@ def _scene(
             resolver=cast(trimesh.resolvers.Resolver, others),
         )
     except Exception as exc:
-        if isinstance(others, _other_files.Resolver):
+        if isinstance(others, other_files.Resolver):
             _check_refused(others, what)
         # trimesh treats a file that is not binary as text, and asks a package that sarcl does not need for its encoding
         guess = isinstance(exc, ModuleNotFoundError) and exc.name == "charset_normalizer"
@@ -190,14 +181,14 @@ def _scene(
         _collada_checks.check(collada, what)
     n_faces = sum(len(one.faces) for one in scene.geometry.values() if isinstance(one, trimesh.Trimesh))
     if declared is not None and n_faces < declared:  # polygons count as several
-        raise ValueError(f"{what} declares {declared} faces and holds {n_faces}: {_mesh_checks.TAKE}")
+        raise ValueError(f"{what} declares {declared} faces and holds {n_faces}: {_checks.TAKE}")
     return scene
 
 
-def _check_refused(others: _other_files.Resolver, what: str) -> None:
+def _check_refused(others: other_files.Resolver, what: str) -> None:
     if others.refused:
         raise ValueError(
-            f"{what} leads to another file: {others.refused[0]!r:.200}, outside its folder, {_other_files.ALLOW}"
+            f"{what} leads to another file: {others.refused[0]!r:.200}, outside its folder, {other_files.ALLOW}"
         )
 
 
@@ -214,7 +205,7 @@ def _parts(scene: trimesh.Scene, what: str) -> tuple[np.ndarray, np.ndarray, np.
         if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
             continue
         corners, triangles = np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64)
-        _mesh_checks.check_indices(corners, triangles, what)
+        _checks.check_indices(corners, triangles, what)
         if not np.array_equal(matrix, np.eye(4)):
             corners = corners @ matrix[:3, :3].T + matrix[:3, 3]
             if np.linalg.det(matrix[:3, :3]) < 0:  # a mirror reverses windings

@@ -10,7 +10,7 @@ import re
 
 import numpy as np
 
-from . import _mesh_checks
+from . import _checks
 
 # what makes it necessary to look closer at the text of an .obj file
 ODD = re.compile(
@@ -48,7 +48,7 @@ def of_obj(data: bytes, what: str) -> bytes | None:
     if points is not None:
         for number in _wrong_fans([[(corner[0] or 0) - 1 for corner in corners] for _, corners in faces], points):
             number, corners = faces[number]
-            raise ValueError(f"{what}, line {number + 1}: a face of {len(corners)} corners {_mesh_checks.CONCAVE}")
+            raise ValueError(f"{what}, line {number + 1}: a face of {len(corners)} corners {_checks.CONCAVE}")
     return "\n".join(lines).encode()
 
 
@@ -96,13 +96,13 @@ def check_off(data: bytes, what: str) -> None:
         return  # which trimesh refuses
     points = _numbers([line.split()[:3] for line in lines[1 : n + 1]])
     if points is not None and (wrong := _wrong_fans(polygons, points)):
-        raise ValueError(f"{what}: face {wrong[0]}, of {len(polygons[wrong[0]])} corners, {_mesh_checks.CONCAVE}")
+        raise ValueError(f"{what}: face {wrong[0]}, of {len(polygons[wrong[0]])} corners, {_checks.CONCAVE}")
 
 
 def _wrong_fans(polygons: list[list[int]], points: np.ndarray) -> list[int]:
     """Numbers of the polygons that fans do not cover. Indices that no vertex can have are left to trimesh."""
     index = [max(-1, min(i, len(points))) for polygon in polygons for i in polygon]
-    return _mesh_checks.wrong_fans(np.array([len(p) for p in polygons], np.int64), np.array(index, np.int64), points)
+    return _checks.wrong_fans(np.array([len(p) for p in polygons], np.int64), np.array(index, np.int64), points)
 
 
 def _decoded(data: bytes) -> str | None:

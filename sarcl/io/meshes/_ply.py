@@ -13,7 +13,7 @@ from typing import Literal
 
 import numpy as np
 
-from . import _mesh_checks
+from . import _checks
 
 C_TYPES = "char:i1 uchar:u1 short:i2 ushort:u2 int:i4 uint:u4 float:f4 double:f8"
 SIZED_TYPES = (
@@ -57,14 +57,14 @@ def read(data: bytes, what: str) -> tuple[np.ndarray, np.ndarray]:
     """
     head = HEADER.match(data)
     if head is None:
-        raise ValueError(f"{what} cannot be read as .ply (no header from 'ply' to 'end_header'): {_mesh_checks.TAKE}")
+        raise ValueError(f"{what} cannot be read as .ply (no header from 'ply' to 'end_header'): {_checks.TAKE}")
     order, elements = _header(head[1].decode("latin-1"), what)
     body = _Text(data[head.end() :], what) if not order else _Binary(data[head.end() :], order)
     position = 0
     for element in elements:
         position = _place(element, body, position, what)
     if position != body.size:
-        raise ValueError(f"{what} holds {body.size - position} {body.unit} more than it declares: {_mesh_checks.TAKE}")
+        raise ValueError(f"{what} holds {body.size - position} {body.unit} more than it declares: {_checks.TAKE}")
     elements_by_name = {element.name: element for element in elements if element.rows}
     for name in elements_by_name:
         if name.startswith("tristrip"):
@@ -97,10 +97,10 @@ def _header(text: str, what: str) -> tuple[Order, list[_Element]]:
         except (KeyError, IndexError):
             raise ValueError(
                 f"{what}: {line.strip()!r:.60} is no line of the header of a PLY file, wanted a format, element, "
-                f"property or comment: {_mesh_checks.TAKE}"
+                f"property or comment: {_checks.TAKE}"
             ) from None
     if order is None:
-        raise ValueError(f"{what} has no line 'format' in its header: {_mesh_checks.TAKE}")
+        raise ValueError(f"{what} has no line 'format' in its header: {_checks.TAKE}")
     _check_names([element.name for element in elements], "elements", what)
     for element in elements:
         _check_names([p.name for p in element.properties], f"properties of {element.name!r:.40}", what)
@@ -111,7 +111,7 @@ def _check_names(names: list[str], kind: str, what: str) -> None:
     """ValueError for a name that is given twice: which of the two is meant cannot be told."""
     twice = next((name for name, n in Counter(names).items() if n > 1), None)
     if twice is not None:
-        raise ValueError(f"{what} declares two {kind} with the name {twice!r:.40}, wanted one: {_mesh_checks.TAKE}")
+        raise ValueError(f"{what} declares two {kind} with the name {twice!r:.40}, wanted one: {_checks.TAKE}")
 
 
 def _type(name: str) -> np.dtype:
@@ -130,13 +130,13 @@ class _Text:
         if wrong is None and b"_" in body:  # NumPy takes 1_0 for 10
             wrong = next(word for word in words if b"_" in word)
         if wrong is not None:
-            raise ValueError(f"{what} has a word that is no number: {str(wrong)[1:]:.60}: {_mesh_checks.TAKE}")
+            raise ValueError(f"{what} has a word that is no number: {str(wrong)[1:]:.60}: {_checks.TAKE}")
         self.numbers = np.empty(self.size)
         try:
             for at in range(0, self.size, PIECE):
                 self.numbers[at : at + PIECE] = np.array(words[at : at + PIECE], "S").astype(np.float64)
         except ValueError as exc:
-            raise ValueError(f"{what} has words that are no numbers ({exc}): {_mesh_checks.TAKE}") from None
+            raise ValueError(f"{what} has words that are no numbers ({exc}): {_checks.TAKE}") from None
 
     def width(self, type_: np.dtype) -> int:
         return 1
@@ -224,7 +224,7 @@ def _count(element: _Element, row: int, p: _Property, body: _Text | _Binary, at:
     if not (0 <= count <= largest and count == int(count)):
         raise ValueError(
             f"{what}: {element.name} {row} has {count:g} {p.name}, wanted a whole number from 0 to {largest:.10g}, the "
-            f"largest of the declared type: {_mesh_checks.TAKE}"
+            f"largest of the declared type: {_checks.TAKE}"
         )
     if at + body.width(p.count) + int(count) * body.width(p.type) > body.size:
         raise _short(element, row, what)
@@ -234,15 +234,13 @@ def _count(element: _Element, row: int, p: _Property, body: _Text | _Binary, at:
 def _short(element: _Element, rows: int, what: str) -> ValueError:
     noun = PLURAL.get(element.name, f"rows of {element.name!r:.40}")
     difference = f"it declares {element.rows} {noun} and holds {rows}"
-    return ValueError(f"{what} cannot be read as .ply ({difference}): {_mesh_checks.TAKE}")
+    return ValueError(f"{what} cannot be read as .ply ({difference}): {_checks.TAKE}")
 
 
 def _vertices(element: _Element, body: _Text | _Binary, what: str) -> np.ndarray:
     types = {p.name: p.type for p in element.properties if p.count is None}
     if not {"x", "y", "z"} <= set(types):
-        raise ValueError(
-            f"{what} has vertices of {', '.join(types) or 'nothing'}, wanted x, y and z: {_mesh_checks.TAKE}"
-        )
+        raise ValueError(f"{what} has vertices of {', '.join(types) or 'nothing'}, wanted x, y and z: {_checks.TAKE}")
     coordinates = [body.take(element.start[name], types[name]) for name in "xyz"]
     return np.stack(coordinates, axis=1).astype(np.float64)
 
@@ -251,11 +249,11 @@ def _triangles(element: _Element, body: _Text | _Binary, vertices: np.ndarray, w
     lists = [p for p in element.properties if p.count is not None]
     p = next((p for p in lists if p.name in FACES), lists[0] if len(lists) == 1 else None)
     if p is None:
-        raise ValueError(f"{what} has faces without a list {' or '.join(FACES)}: {_mesh_checks.TAKE}")
+        raise ValueError(f"{what} has faces without a list {' or '.join(FACES)}: {_checks.TAKE}")
     corners = element.length[p.name]
     if (corners < 3).any():
         face = int(np.argmax(corners < 3))
-        raise ValueError(f"{what}: face {face} has {corners[face]} corners, wanted at least 3: {_mesh_checks.TAKE}")
+        raise ValueError(f"{what}: face {face} has {corners[face]} corners, wanted at least 3: {_checks.TAKE}")
     begin = np.cumsum(corners) - corners
     within = np.arange(int(corners.sum())) - np.repeat(begin, corners)
     index = body.take(np.repeat(element.start[p.name], corners) + within * body.width(p.type), p.type)
@@ -264,10 +262,10 @@ def _triangles(element: _Element, body: _Text | _Binary, vertices: np.ndarray, w
     if is_wrong.any():
         face = int(np.argmax(is_wrong))
         raise ValueError(
-            f"{what}: face {owner[face]} names vertex {index[face]:.20g} of {len(vertices)}: {_mesh_checks.TAKE}"
+            f"{what}: face {owner[face]} names vertex {index[face]:.20g} of {len(vertices)}: {_checks.TAKE}"
         )
     index = index.astype(np.int64)
-    wrong_faces = _mesh_checks.wrong_fans(corners, index, vertices)
+    wrong_faces = _checks.wrong_fans(corners, index, vertices)
     if wrong_faces:
-        raise ValueError(f"{what}: face {wrong_faces[0]}, of {corners[wrong_faces[0]]} corners, {_mesh_checks.CONCAVE}")
-    return _mesh_checks.fans(corners, index)
+        raise ValueError(f"{what}: face {wrong_faces[0]}, of {corners[wrong_faces[0]]} corners, {_checks.CONCAVE}")
+    return _checks.fans(corners, index)
