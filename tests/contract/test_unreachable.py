@@ -356,6 +356,7 @@ MAY_CATCH = {
     "io/input_paths.py": "names that no system takes",
     "io/_gotcha.py": "scipy's reader of damaged files; the file is put before a message, which is raised again",
     "io/_checksums.py": "text that is no JSON",
+    "io/labelled_files.py": "readers of damaged files, of xarray, zarr and h5py",
     "io/meshes/_gltf_checks.py": "text that is no JSON",
     "io/meshes/_text.py": "text that is no UTF-8 and no numbers",
     "io/meshes/_ply.py": "words of text that are no numbers",
