@@ -20,7 +20,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from ..base import arguments
-from . import input_paths, output_paths
+from . import input_paths
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -120,7 +120,7 @@ def is_zarr(path: Path) -> bool:
 def check_writable(path: PathLike, n_bytes: int = 0) -> None:
     """Raises what writing a file of this name would, as far as that can be known before."""
     form = named(path, [ZARR, NETCDF])
-    (output_paths if form is None else form.functions).check_writable(path, n_bytes)
+    (import_module(".output_paths", __package__) if form is None else form.functions).check_writable(path, n_bytes)
 
 
 def writing(*kinds: Written, by_blocks: bool = False) -> list[Format]:

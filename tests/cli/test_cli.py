@@ -196,7 +196,9 @@ def test_an_output_that_cannot_be_written_is_found_before_the_work(raw_file, her
 
 
 def test_outputs_of_unknown_kind_or_named_twice_are_refused(raw_file, capsys, no_work):
-    assert "ends in '.jpg'; choose a name that ends in .png or .h5" in refused(capsys, "focus", raw_file, "-o", "a.jpg")
+    assert "ends in '.jpg'; choose a name that ends in .png, .h5, .zarr or .nc" in refused(
+        capsys, "focus", raw_file, "-o", "a.jpg"
+    )
     assert "name one file twice" in refused(capsys, "focus", raw_file, "-o", "a.png", "-o", "./a.png")
 
 
@@ -205,7 +207,7 @@ def test_folders_and_names_without_an_ending_are_called_so(raw_file, here, capsy
     for folder in ("folder", ".", "folder/.."):
         said = refused(capsys, "focus", folder)
         assert f"'{folder}' is a folder; give the files in it, as in" in said and "ends in" not in said
-    assert "'folder' is a folder; choose a name that ends in .png or" in refused(
+    assert "'folder' is a folder; choose a name that ends in .png, .h5" in refused(
         capsys, "focus", raw_file, "-o", "folder"
     )
     assert "'image' has no ending; choose a name" in refused(capsys, "focus", raw_file, "-o", "image")
