@@ -11,7 +11,7 @@ from ..base.tolerances import askable, rounded_up
 from ..scattering.antenna_weights import AntennaWeights
 from ..scattering.facet_shadows import ShadowRule
 from ..scattering.facets import FacetSet
-from ..scattering.mesh_quality import facet_error, speckle_contrast
+from ..scattering.mesh_quality import facet_error, post_spacing, speckle_contrast
 from ..scattering.rough_pieces import PIECE_BYTES, RoughFacets
 from ..scattering.scatterers import Points, facets_of, points_of
 from ..scattering.subdivision import Subdivision
@@ -169,13 +169,15 @@ def _shadow_terms(request: EchoRequest, scene: Scene, facets: Sequence[FacetSet]
 
 
 def warn_of_curves(plan: ScenePlan) -> dict[str, Any]:
-    """Warn of facets that are too large for the curves that they approximate; returns what a report says of them."""
+    """Warn of posts and facets too large for what they stand for; returns what a report says of them."""
     if plan.subdivision is None:
         return {}
-    return _warned(facet_error.judge(plan.seen.original, plan.seen.antennas, plan.seen.waveform))
+    seen = plan.seen
+    _warned(post_spacing.judge(seen.original, seen.antennas, seen.waveform))
+    return _warned(facet_error.judge(seen.original, seen.antennas, seen.waveform))
 
 
-def _warned(judgement: facet_error.FacetError | speckle_contrast.Speckle) -> dict[str, Any]:
+def _warned(judgement: facet_error.FacetError | post_spacing.PostSpacing | speckle_contrast.Speckle) -> dict[str, Any]:
     for number, text in enumerate(judgement.warnings()):
         warn(text, f"{type(judgement).__name__} {number}")
     return judgement.describe()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +13,7 @@ from sarcl import shapes
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.numerics.pulse_geometry import PulseGeometry
 from sarcl.reference.facet import facet_amplitude
-from sarcl.scattering.mesh_quality import facet_error, speckle_contrast
+from sarcl.scattering.mesh_quality import facet_error, post_spacing, speckle_contrast
 from sarcl.scattering.mesh_quality._adjacency import adjacency_of, uncut
 from sarcl.scattering.mesh_quality._curvature import curvature_of
 from sarcl.scene import triangles as geometry
@@ -470,3 +471,19 @@ def test_echo_warns_of_too_few_facets_only_where_it_may_not_cut_them():
         sarcl.echo(coarse, X_BAND, track, max_edge=None, tolerance=1e-2, shadows=False)
     raw = sarcl.echo(coarse, X_BAND, track, tolerance=1e-2, shadows=False)
     assert raw.report.plan["rough facets per resolution cell"] >= 2
+
+
+@pytest.mark.parametrize(("spacing", "is_shown"), [(2.0, True), (0.8, True), (0.5, False)])
+def test_posts_that_are_resolved_show_as_a_grid_and_are_told(spacing, is_shown):
+    chirp = sarcl.Waveform.chirp(center=9.6e9, bandwidth=300e6, duration=1e-6)
+    track = sarcl.Trajectory.circle(radius=8e3, height=6e3, arc=0.024, n_pulses=64)  # cells of 0.5 m x 0.65 m
+    x = np.arange(-16, 16.01, spacing)
+    scene = sarcl.Scene.from_heights(x, x, np.zeros((len(x), len(x))), point_roughness=0.05)
+    judged = post_spacing.judge(scene, PulseGeometry(track.positions, track.positions), chirp)
+    assert judged.cell == pytest.approx((0.5, 0.81), rel=0.05) and judged.spacing == pytest.approx(spacing)
+    with pytest.warns(sarcl.SarclWarning, match="posts will show as a grid") if is_shown else nullcontext():
+        raw = sarcl.echo(scene, chirp, track, tolerance=1e-1)
+    power = np.abs(sarcl.backproject(raw, sarcl.ImageGrid.plane(shape=128, spacing=0.2), tolerance=1e-2).data) ** 2
+    spectrum = np.abs(np.fft.fft2(power / power.mean() - 1)) ** 2
+    line = spectrum[0, round(128 * 0.2 / spacing)]  # along x, the coordinate of range
+    assert (line > 100 * np.median(spectrum)) == is_shown

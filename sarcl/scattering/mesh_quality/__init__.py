@@ -4,6 +4,7 @@ For other folders:
 
     facet_error        error of flat facets against the curved surface they approximate, dB
     facet_groups       neighbours in one plane, which are one facet to a wave
+    post_spacing       posts with random heights that an image resolves
     speckle_contrast   speckle contrast that the number of facets per resolution cell allows
 
 For this folder alone:
