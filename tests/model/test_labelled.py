@@ -89,6 +89,10 @@ def test_others_read_the_pixels_with_their_positions_and_units(tmp_path):
         pixel = dataset.sel(x=-1.5, y=1.0, method="nearest")
         place = [float(pixel[axis]) for axis in "xyz"]
         assert place == list(PLANE.grid.at(15, 0)) and dataset["x"].attrs["units"] == "m"
+        assert (
+            complex(pixel["data"] if "data" in pixel else pixel["data_real"] + 1j * pixel["data_imag"])
+            == PLANE.data[15, 0]
+        )
         assert dataset.attrs["polarization"] == "HH" and dataset.attrs["window"] == "hamming"
         dataset.close()
 
