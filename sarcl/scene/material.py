@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base import validation
+from ..base.errors import warn
 
 VACUUM_PERMITTIVITY = 8.8541878128e-12  # F/m
 Diagram = Literal["smooth", "isotropic", "cos", "cos2", "exp", "sinc"]
@@ -22,8 +23,10 @@ COHERENT = ("smooth", "sinc")  # diagrams of a coherent reflection, like that of
 class Material:
     """A homogeneous half space under a surface that may be rough below the size of a facet; or a thin sheet.
 
-    eps_r         relative permittivity eps' - j eps'', the same at all frequencies: eps' at least 1, eps'' at least 0
+    eps_r         relative permittivity eps' - j eps'': eps' at least 1, eps'' at least 0
     conductivity  S/m, whose losses add to eps''; inf is a perfect conductor
+    exponents     (b, d): both are those at 1 GHz, and at f GHz eps_r f^b and conductivity f^d. Default: constants
+    band          Hz (2,): where these were measured; echoes at other frequencies warn
     height        rms height of the roughness finer than a facet, m: the coherent reflection falls by
                   exp(-(q.n height)^2/2); inf: there is none. Default 0, with a diagram inf
     diagram       re-irradiation of the incoherent part, d the angle between the normal and the bisector of the two
@@ -48,6 +51,8 @@ class Material:
     reflectivity: float = 1.0
     name: str = ""
     thickness: float = 0.0
+    exponents: tuple[float, float] = (0.0, 0.0)
+    band: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         validation.choice("diagram", self.diagram, DIAGRAMS)
@@ -67,6 +72,17 @@ class Material:
             else:
                 value = default[name] if value is None else _number(name, value, name in ("conductivity", "height"))
             object.__setattr__(self, name, value)
+        exponents = validation.pair("exponents", self.exponents)
+        object.__setattr__(
+            self,
+            "exponents",
+            (_number("exponents[0]", exponents[0], False), _number("exponents[1]", exponents[1], False)),
+        )
+        if self.band is not None:
+            low, high = (_number("band", value, False) for value in validation.pair("band", self.band))
+            if not 0 < low < high:
+                raise ValueError(f"band is {low:g} to {high:g} Hz; give the lower frequency first, both greater than 0")
+            object.__setattr__(self, "band", (low, high))
         if not np.real(self.eps_r) >= 1:
             raise ValueError(
                 f"eps_r is {self.eps_r:g}; a relative permittivity is at least 1 (vacuum), with losses as a negative "
@@ -126,7 +142,7 @@ class Material:
         """Complex relative permittivity eps_r - j conductivity/(2 pi f eps0) at `frequency`, Hz, of its shape.
 
         eps_r may be complex itself: both losses add. The imaginary part is negative, because fields vary as
-        exp(+j 2 pi f t). inf for a perfect conductor.
+        exp(+j 2 pi f t). inf for a perfect conductor. A warning names a frequency outside `band`.
         """
         frequency = validation.values("frequency", frequency)
         if not (frequency > 0).all():
@@ -135,8 +151,35 @@ class Material:
         if self.conducting:
             values = np.full(frequency.shape, np.inf, np.complex128)
         else:
-            values = self.eps_r - 1j * self.conductivity / (2 * np.pi * VACUUM_PERMITTIVITY * frequency)
+            power, power_of_losses = self.exponents
+            gigahertz = frequency / 1e9
+            losses = self.conductivity * gigahertz**power_of_losses / (2 * np.pi * VACUUM_PERMITTIVITY * frequency)
+            values = self.eps_r * gigahertz**power - 1j * losses
+            self._warn_outside(float(frequency.min()), float(frequency.max()))
         return np.asarray(values)[()]
+
+    def _warn_outside(self, low: float, high: float) -> None:
+        """Warn of frequencies outside `band`."""
+        if self.band is not None and not self.band[0] <= low <= high <= self.band[1]:
+            warn(
+                f"the permittivity of {self.name or 'a material'} is known from {self.band[0] / 1e9:g} to "
+                f"{self.band[1] / 1e9:g} GHz, and is taken at {(low if low < self.band[0] else high) / 1e9:.4g} GHz; "
+                "give a Material that was measured there",
+                f"band of {self.name}",
+            )
+
+    def at(self, frequency: float) -> Material:
+        """The material with the permittivity that it has at `frequency`, Hz, as constants."""
+        if self.exponents == (0.0, 0.0) or self.conducting:
+            return self
+        powers = [(frequency / 1e9) ** power for power in self.exponents]
+        constants = {"eps_r": self.eps_r * powers[0], "conductivity": self.conductivity * powers[1]}
+        return replace(self, **constants, exponents=(0.0, 0.0))
+
+    @property
+    def disperses(self) -> bool:
+        """Whether the permittivity depends on frequency."""
+        return not self.conducting and (self.conductivity > 0 or self.exponents[0] != 0)
 
 
 # a name of MATERIALS, or the amplitude reflectivity of a perfect conductor; one for all facets, or one for each
@@ -176,21 +219,45 @@ def _lossy(value: complex) -> complex:
 
 
 METAL = Material(name="metal")
-# Values at 10 GHz; docs/guide/scenes.md names the source of each. Add your own: MATERIALS["snow"] = Material(1.5).
+# ITU-R P.2040-3, table 3: a, b, c, d of eps_r = a f^b and conductivity = c f^d S/m, f in GHz, and where they hold, GHz
+_ITU = {
+    "concrete": (5.24, 0.0, 0.0462, 0.7822, 1, 100),
+    "brick": (3.91, 0.0, 0.0238, 0.16, 1, 40),
+    "plasterboard": (2.73, 0.0, 0.0085, 0.9395, 1, 100),
+    "wood": (1.99, 0.0, 0.0047, 1.0718, 0.001, 100),
+    "glass": (6.31, 0.0, 0.0036, 1.3394, 0.1, 100),
+    "ceiling board": (1.48, 0.0, 0.0011, 1.0750, 1, 100),
+    "chipboard": (2.58, 0.0, 0.0217, 0.78, 1, 100),
+    "plywood": (2.71, 0.0, 0.33, 0.0, 1, 40),
+    "marble": (7.074, 0.0, 0.0055, 0.9262, 1, 60),
+    "very dry ground": (3.0, 0.0, 0.00015, 2.52, 1, 10),
+    "medium dry ground": (15.0, -0.1, 0.035, 1.63, 1, 10),
+    "wet ground": (30.0, -0.4, 0.15, 1.30, 1, 10),
+}
+
+
+def itu(name: str) -> Material:
+    """A building material or ground of ITU-R P.2040-3, table 3, whose permittivity follows the frequency.
+
+    name  "concrete", "brick", "plasterboard", "wood", "glass", "ceiling board", "chipboard", "plywood", "marble",
+          "very dry ground", "medium dry ground" or "wet ground"
+    ValueError for another name.
+    """
+    a, b, c, d, low, high = _ITU[validation.choice("name", name, tuple(_ITU))]
+    return Material(a, c, exponents=(b, d), band=(low * 1e9, high * 1e9), name=name)
+
+
+# docs/guide/scenes.md names the source of each. Add your own: MATERIALS["snow"] = Material(1.5).
 MATERIALS: dict[str, Material] = {
     material.name: material
     for material in (
         METAL,
-        # ITU-R P.2040-3, table 3: eps_r = a f^b, conductivity = c f^d, f in GHz
-        Material(5.24, 0.280, name="concrete"),
-        Material(3.91, 0.0344, name="brick"),
-        Material(7.07, 0.0464, name="marble"),
-        Material(2.73, 0.0739, name="plasterboard"),
-        Material(1.99, 0.0554, name="wood"),
-        Material(6.31, 0.0787, name="glass"),
-        Material(3.0, 0.0497, name="dry soil"),
-        Material(11.9, 1.49, name="moist soil"),
-        Material(11.9, 2.99, name="wet soil"),
+        *(itu(name) for name in _ITU),
+        # earlier names of these grounds
+        replace(itu("very dry ground"), name="dry soil"),
+        replace(itu("medium dry ground"), name="moist soil"),
+        replace(itu("wet ground"), name="wet soil"),
+        # at 10 GHz:
         # Meissner and Wentz 2004, 2012 at 20 degrees Celsius, 0 and 35 g/kg of salt
         Material(60.7, 18.2, name="water"),
         Material(55.9, 20.6, name="sea water"),

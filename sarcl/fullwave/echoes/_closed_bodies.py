@@ -76,29 +76,36 @@ def _named(material: Material) -> str:
 def parts_of(scene: Scene, frequency: float, exact: float | None = None) -> list[tuple[np.ndarray, complex | None]]:
     """Facets of each material (k, 3, 3), and its permittivity, relative, at a frequency, Hz; None: a conductor.
 
-    exact  frequency, Hz, at which the imaginary part of a complex eps_r is that of the conductivity that the grid has
-           in its place; default: the same frequency
+    exact  frequency, Hz, at which the permittivity and conductivity that the grid has are those of the material, where
+           these follow frequency or eps_r is complex; default: the same frequency
     """
-    more = 0.0 if exact is None else exact / frequency - 1
+    exact = frequency if exact is None else exact
     out: list[tuple[np.ndarray, complex | None]] = []
     for number, material in enumerate(scene.materials):
         triangles = scene.triangles[scene.material == number]
         if len(triangles):
             permittivity = None
             if not material.conducting:
-                permittivity = complex(material.permittivity(frequency)) + 1j * more * float(np.imag(material.eps_r))
+                there = complex(material.permittivity(exact))
+                permittivity = complex(there.real, there.imag * exact / frequency)
             out.append((triangles, permittivity))
     return out
 
 
 def losses_said(scene: Scene, frequency: float) -> dict[str, object]:
-    """For reports: the conductivity of each lossy material whose eps_r is complex, which the grid has at every
-    frequency: that of its permittivity at the waveform's centre, Hz. Empty where there is none.
+    """For reports: what the grid has at every frequency of each material whose eps_r is complex or follows frequency:
+    the permittivity and conductivity at the waveform's centre, Hz. Empty where there is none.
     """
     said = []
     for number, material in enumerate(scene.materials):
-        if np.imag(material.eps_r) and not material.conducting and (scene.material == number).any():
-            loss = -float(np.imag(material.permittivity(frequency)))
-            conductivity = loss * 2 * np.pi * frequency * VACUUM_PERMITTIVITY
-            said.append(f"eps_r {material.eps_r:g} as {conductivity:.3g} S/m, exact at {frequency / 1e9:.4g} GHz")
+        follows = bool(np.imag(material.eps_r)) or any(material.exponents)
+        if follows and not material.conducting and (scene.material == number).any():
+            permittivity = complex(material.permittivity(frequency))
+            conductivity = -permittivity.imag * 2 * np.pi * frequency * VACUUM_PERMITTIVITY
+            what = (
+                f"eps_r {material.eps_r:g}"
+                if np.imag(material.eps_r)
+                else f"{permittivity.real:.4g} of {_named(material)}"
+            )
+            said.append(f"{what} as {conductivity:.3g} S/m, exact at {frequency / 1e9:.4g} GHz")
     return {"losses": "; ".join(said)} if said else {}

@@ -40,7 +40,7 @@ class Coatings:
     @property
     def disperses(self) -> bool:
         """Whether reflection coefficients depend on frequency."""
-        return any(0 < m.conductivity < np.inf for m in self.materials)
+        return any(m.disperses for m in self.materials)
 
 
 @dataclass(frozen=True, eq=False)
