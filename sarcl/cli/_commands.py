@@ -138,11 +138,10 @@ def focus(args: argparse.Namespace, job: Job) -> int:
     _check_scale(args)
     place = _grid_options(args)
     grid = None if args.grid is None else load(args.grid).build_grid()
-    raw = read(args.raw if len(args.raw) > 1 else args.raw[0], autofocus=args.autofocus)
+    rows = {"polarization": args.polarization, "channel": args.channel}
+    raw = read(args.raw if len(args.raw) > 1 else args.raw[0], autofocus=args.autofocus, **rows)
     if not isinstance(raw, PhaseHistory):
         raise ValueError(f"{args.raw[0]!r} holds an image; focus wants echoes (sarcl measure takes images)")
-    if args.polarization is not None or args.channel is not None:
-        raw = raw.select(polarization=args.polarization, channel=args.channel)
     check_polarizations(raw, args.sum_polarizations, "--polarization {}", "--sum-polarizations")
     devices: Any = open_devices(args.device)
     job.say(f"{raw.n_rows} rows of {raw.n_samples} samples at {raw.center_frequency.mean() / 1e9:.4g} GHz")

@@ -98,8 +98,8 @@ def check_default_grid(args: argparse.Namespace, raw: PhaseHistory) -> None:
 
     name = next((n for n in ("side", "heights") if getattr(args, n) is not None), None)
     if name is not None and (args.grid is not None or args.center is not None or not needs_side(raw)):
-        local = args.grid is None and args.center is None
-        why = "the echoes are in local coordinates" if local else "the grid is given"
+        local = "the file names an image area" if raw.image_area is not None else "the echoes are in local coordinates"
+        why = local if args.grid is None and args.center is None else "the grid is given"
         raise ValueError(
             f"--{name} places the grid that is chosen for Earth-fixed echoes, and {why}: leave it out, or take "
             "--method range_doppler"

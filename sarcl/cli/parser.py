@@ -22,6 +22,7 @@ EPILOG = """examples:
   sarcl demo                                            simulate and focus a scene: out/demo.png
   sarcl simulate scene.toml -o raw.h5 --image image.png
   sarcl focus raw.h5 -o image.png -o image.h5 --window taylor:35:5
+  sarcl focus pass.cphd                                 on the image area that the file names: pass.png
   sarcl focus orbit_raw.h5 --method range_doppler --side right --heights 250 -o image.h5
   sarcl measure image.h5 --near 10 0 0
   sarcl papers saras --quick                            published beside measured: saras.html
@@ -197,7 +198,7 @@ def _focus_rows(p: argparse.ArgumentParser) -> None:
     rows = p.add_argument_group("data")
     _add(rows, "--polarization PQ", "only rows of this polarisation, e.g. HV")
     _flag(rows, "--sum-polarizations", "add rows of several polarisations coherently")
-    _add(rows, "--channel N", "only rows of this receive channel", int)
+    _add(rows, "--channel N", "only rows of this receive channel; of CPHD the name of a channel")
     _flag(rows, "--autofocus", "apply the corrections a Gotcha file holds")
 
 

@@ -22,6 +22,7 @@ from ..model.phase_history import PhaseHistory
 log = logging.getLogger(__name__)
 
 MOST = 1024  # pixels along a side, at most
+MOST_OF_AREA = 8192  # pixels along a side of an image area that a file names, at most: an image of 0.5 GB
 ROWS = 4096  # rows from which the geometry is taken
 # Smallest ratio of a singular value to the largest at which all three coordinates are determined, and at which a
 # direction on the ground is; other directions are left unchanged
@@ -56,7 +57,9 @@ def default_grid(
     side     "left" or "right" of the track, for Earth-fixed echoes without a center
     heights  m above the ellipsoid, or an ElevationModel, of the center of Earth-fixed echoes
 
-    The plane is horizontal; of Earth-fixed echoes it is tangent to the ellipsoid at its center, and columns run east.
+    The image area of the echoes, where they have one (from a CPHD file) and center is None, gives centre, axes and
+    extent, at most 8192 pixels along a side. Else the plane is horizontal; of Earth-fixed echoes it is tangent to the
+    ellipsoid at its center, and columns run east.
     The reasons for the choice are logged (INFO). TypeError where raw is no PhaseHistory; ValueError for echoes without
     rows, and for Earth-fixed ones without side and center.
     """
@@ -80,6 +83,10 @@ def choose_grid(
     """As `default_grid`, with the reasons for the choice; normal, x_axis as in `ImageGrid.plane`."""
     part = raw if raw.n_rows <= ROWS else raw[spread_over(raw.n_rows, ROWS)]
     why = []
+    area = raw.image_area if center is None and normal is None and x_axis is None else None
+    if area is not None:
+        center, x_axis, normal = area[0], area[1], np.cross(area[1], area[2])
+        why.append("centre: of the image area that the file names")
     on_earth = needs_side(part)
     if center is None and on_earth:
         center, words = _center_on_earth(part, side, heights)
@@ -100,7 +107,13 @@ def choose_grid(
     if spacing is None:
         spacing = tuple(float(f"{d:.4g}") for d in cell / 2)
         why.append(f"pixels half the resolution of {cell[0]:.3g} x {cell[1]:.3g} m")
-    if shape is None:
+    if shape is None and area is not None:
+        sides = 2 * np.linalg.norm(area[[2, 1]], axis=1)
+        pixels = np.ceil(np.maximum(sides / np.broadcast_to(spacing, 2), 1)).astype(int)
+        shape = np.minimum(pixels, MOST_OF_AREA).tolist()
+        limit = "" if (pixels <= MOST_OF_AREA).all() else f"{MOST_OF_AREA} pixels at most of "
+        why.append(f"{limit}its {sides[0]:.4g} x {sides[1]:.4g} m")
+    elif shape is None:
         unambiguous = [max(1, 2 * round(swath / (2 * d))) for d in np.broadcast_to(spacing, 2)]
         shape = [min(n, MOST) for n in unambiguous]
         limit = "" if shape == unambiguous else f"{MOST} pixels at most of "
@@ -117,7 +130,9 @@ def _excess(raw: PhaseHistory, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def needs_side(raw: PhaseHistory) -> bool:
     """Whether the default centre needs the side of the track: in Earth-fixed coordinates, whose origin is no scene."""
-    return wgs84.is_earth_fixed(raw.tx[raw.n_rows // 2]) and _spread(raw, np.zeros(3)) > _cell(raw)
+    if raw.image_area is not None or not wgs84.is_earth_fixed(raw.tx[raw.n_rows // 2]):
+        return False
+    return _spread(raw, np.zeros(3)) > _cell(raw)
 
 
 def _cell(raw: PhaseHistory) -> float:

@@ -2,7 +2,7 @@
 
 A new format is a new file of this folder and one line of FORMATS. That file holds, as far as the line says so:
 
-    load(path, make, autofocus)                 the file as make("phase history" or "image", its fields by name)
+    load(path, make, **options)                 the file as make("phase history" or "image", its fields by name)
     EchoWriter(path, n_rows, n_samples, dtype)  as in sarcl_hdf5
     ImageWriter(path, grid, dtype, resumes)     as in sarcl_hdf5
     job_of(path)                                where by_blocks is True: the mark of the job that made an image
@@ -17,7 +17,7 @@ from dataclasses import dataclass, fields
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, Literal, TypeVar
+from typing import IO, TYPE_CHECKING, Any, Literal, TypeVar
 
 from ..base import arguments
 from . import input_paths
@@ -42,6 +42,7 @@ class Format:
     starts     first bytes of its files; none where the format is not read
     name       for the list of what can be read
     file       the file of this folder that reads and writes it; none where other rooms do
+    options    of `load` that this format takes; the others have no effect on it, or are applied to what was read
     writes     what can be written: "picture" is made of an image by sarcl/figures, "dataset" by sarcl/model/_labelled
     by_blocks  True where an image can be written block by block, and a killed run go on
     """
@@ -50,6 +51,7 @@ class Format:
     starts: bytes = b""
     name: str = ""
     file: str = ""
+    options: tuple[str, ...] = ()
     writes: tuple[Written, ...] = ()
     by_blocks: bool = False
 
@@ -74,37 +76,39 @@ HDF5 = Format(
     b"\x89HDF\r\n\x1a\n",
     "sarcl's own HDF5 files (raw.save, image.save)",
     "sarcl_hdf5",
+    ("external",),
     writes=("phase history", "image"),
     by_blocks=True,
 )
+CPHD = Format((".cphd",), b"CPHD/", "CPHD files", "cphd._reading", ("channel", "polarization"))
 # recognised by their content: a folder, and HDF5 of another kind
 ZARR, NETCDF = (Format((ending,), file="labelled_files", writes=("dataset",)) for ending in (".zarr", ".nc"))
 FORMATS = (
     Format((".png",), writes=("picture",)),
     HDF5,
-    Format((".mat",), b"MATLAB 5.0 MAT-file", "AFRL Gotcha .mat files (MATLAB 5)", "_gotcha"),
+    Format((".mat",), b"MATLAB 5.0 MAT-file", "AFRL Gotcha .mat files (MATLAB 5)", "_gotcha", ("autofocus",)),
+    CPHD,
     ZARR,
     NETCDF,
 )
 NOT_READ = {  # first bytes of files that are often met, and what to say of them
     b"MATLAB 7.3": "is a MATLAB 7.3 file (save it again with -v7)",
-    b"CPHD/": "is a CPHD file, which sarcl does not read yet",
 }
 
 
-def load(path: Path, make: Make[T], autofocus: bool = False, external: bool = False) -> T:
-    """The object that make(kind, fields) makes of a file, whose format follows from its first bytes.
+def load(path: Path, make: Make[T], **options: object) -> tuple[T, Format]:
+    """The object that make(kind, fields) makes of a file, whose format follows from its first bytes; and the format.
 
-    external  HDF5 files may lead into other files
+    options  those that the format takes are handed on
     ValueError for a file that is of no known format, truncated or damaged, or a pipe; FileNotFoundError,
     IsADirectoryError, PermissionError.
     """
     if is_zarr(path):
-        return ZARR.functions.load(path, make)
+        return ZARR.functions.load(path, make), ZARR
     head = input_paths.head(path, folder="give the files in it, e.g. sorted(Path(folder).glob('*.mat'))")
     form = next((f for f in FORMATS if f.starts and head.startswith(f.starts)), None)
     if form is not None:
-        return form.functions.load(path, make, autofocus, **({"external": True} if external and form is HDF5 else {}))
+        return form.functions.load(path, make, **{n: v for n, v in options.items() if n in form.options}), form
     unreadable = (text for starts, text in NOT_READ.items() if head.startswith(starts))
     unknown = f"starts with {head[:12]!r}, which is no file kind sarcl knows" if head else "is empty"
     is_named_so = any(path.suffix.lower() in f.endings for f in FORMATS if f.starts)
@@ -121,6 +125,15 @@ def check_writable(path: PathLike, n_bytes: int = 0) -> None:
     """Raises what writing a file of this name would, as far as that can be known before."""
     form = named(path, [ZARR, NETCDF])
     (import_module(".output_paths", __package__) if form is None else form.functions).check_writable(path, n_bytes)
+
+
+def load_open(file: IO[bytes], make: Make[T], **options: object) -> tuple[T, Format]:
+    """`load` of an open binary file, which CPHD alone is read from. ValueError for other formats."""
+    file.seek(0)
+    head = file.read(len(CPHD.starts))
+    if head != CPHD.starts:
+        raise ValueError(f"the open file starts with {head!r:.40}; open files are read as CPHD alone: give a path")
+    return CPHD.functions.load(file, make, **options), CPHD
 
 
 def writing(*kinds: Written, by_blocks: bool = False) -> list[Format]:

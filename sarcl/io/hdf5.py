@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 FORMAT = 1  # version of sarcl's HDF5 file
 BLOCK_BYTES = 2**24  # bytes of a block of rows, about
+ATTRIBUTE_LETTERS = 2**12  # letters from which a text is a dataset: attributes end at 64 KB, of all of them together
 
 
 def sign(file: h5py.File, kind: str) -> None:
@@ -41,7 +42,7 @@ def put(group: h5py.Group, name: str, value: object) -> None:
         return
     if isinstance(value, np.generic):
         value = value.item()
-    if isinstance(value, (str, int, float)):
+    if isinstance(value, (int, float)) or (isinstance(value, str) and len(value) < ATTRIBUTE_LETTERS):
         group.attrs[name] = value
         return
     value = np.asarray(value)
@@ -61,7 +62,8 @@ def get(group: h5py.Group, name: str) -> Any:
     if name not in group:
         return None
     if h5py.check_string_dtype(group[name].dtype) is not None:
-        return group[name].asstr()[...].astype(str)
+        words = group[name].asstr()[...]
+        return words.astype(str) if group[name].shape else str(words)
     return group[name][...]
 
 

@@ -74,8 +74,8 @@ def write(path: PathLike, dataset: xarray.Dataset) -> None:
     _put_in_place(target, lambda new: dataset.to_netcdf(new, engine="h5netcdf"))
 
 
-def load(path: Path, make: Make[T], autofocus: bool = False, external: bool = False) -> T:
-    """make("image", fields) of a Zarr store or NetCDF file of `write`, read into memory. autofocus has no effect.
+def load(path: Path, make: Make[T]) -> T:
+    """make("image", fields) of a Zarr store or NetCDF file of `write`, read into memory.
 
     ValueError for one that is damaged, or not by sarcl.
     """

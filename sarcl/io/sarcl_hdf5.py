@@ -33,10 +33,10 @@ ROW_BYTES = 130  # bytes per row besides its samples: its geometry, numbers and 
 ROWS: dict[str, tuple[Kind, str]] = {"phase_history": ("phase history", "samples"), "image": ("image", "data")}
 
 
-def load(path: PathLike, make: Make[T], autofocus: bool = False, external: bool = False) -> T:
+def load(path: PathLike, make: Make[T], external: bool = False) -> T:
     """make(kind, fields) of a file of sarcl's; samples or data stay in it as an h5py.Dataset that keeps it open.
 
-    A group of the file is a mapping among the fields; what the file leaves out is no field. autofocus has no effect.
+    A group of the file is a mapping among the fields; what the file leaves out is no field.
     external  follow links and datasets that lead into other files; sarcl writes none
     Checksums are compared where the file has them: of all but the rows now, of rows when they are read, then OSError.
     ValueError when the file is not HDF5, is truncated or damaged, is not sarcl's, is of a newer format, or leads into

@@ -6,6 +6,7 @@ For other folders:
     antenna_array     AntennaArray: positions and carriers of elements
     antenna_pattern   gain of a pattern in given directions, its steepest slope, its extent
     concatenation     phase histories joined by their rows
+    cphd/             phase histories as CPHD files
     dates             dates in UTC to seconds since an epoch
     image             Image: pixels on a grid
     image_grid        ImageGrid: positions of the pixels

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import fields
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -13,11 +13,14 @@ from .lazy_rows import stack
 from .phase_history import PhaseHistory
 from .waveform import Waveform
 
+_Common: TypeAlias = Waveform | AntennaArray | np.ndarray | str | None  # fields that rows have in common
+
 
 def concatenate(parts: Sequence[PhaseHistory]) -> PhaseHistory:
     """One phase history with the rows of several, in order; all need the same number of samples.
 
-    Optional fields per row and the waveform are kept where every part has them; lazy samples stay lazy.
+    Optional fields per row, the waveform, image area and metadata are kept where every part has them; lazy samples stay
+    lazy.
     ValueError names the part that differs.
     """
     if isinstance(parts, PhaseHistory):
@@ -39,7 +42,7 @@ def concatenate(parts: Sequence[PhaseHistory]) -> PhaseHistory:
         values = [getattr(p, name) for p in parts]
         if name == "samples":
             joined["samples"] = stack(values)
-        elif name in ("waveform", "array"):
+        elif name in ("waveform", "array", "image_area", "metadata"):
             joined[name] = values[0] if all(_alike(v, values[0]) for v in values) else None
         elif isinstance(values[0], np.ndarray) and all(v is not None for v in values):
             joined[name] = np.concatenate(values)
@@ -50,8 +53,12 @@ def concatenate(parts: Sequence[PhaseHistory]) -> PhaseHistory:
     return PhaseHistory(**joined, compressed=parts[0].compressed)
 
 
-def _alike(a: Waveform | AntennaArray | None, b: Waveform | AntennaArray | None) -> bool:
-    """True where two waveforms (or None) have equal fields."""
-    if a is None or b is None or type(a) is not type(b):
+def _alike(a: _Common, b: _Common) -> bool:
+    """True where two waveforms have equal fields, or two arrays or texts are equal, or both are None."""
+    if a is b or a is None or b is None or type(a) is not type(b):
         return a is b
-    return a is b or all(np.array_equal(getattr(a, f.name), getattr(b, f.name)) for f in fields(a))
+    if isinstance(a, str):
+        return a == b
+    if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
+        return np.array_equal(np.asarray(a), np.asarray(b))
+    return all(np.array_equal(getattr(a, f.name), getattr(b, f.name)) for f in fields(a))

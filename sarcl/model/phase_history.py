@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal, Unpack
 
@@ -39,6 +39,8 @@ class PhaseHistory(NotebookTable):
     time, tx_channel, rx_channel, polarization, weight, tx_velocity, rx_velocity   optional, one per row
     waveform         the transmitted Waveform, or None;  array  the AntennaArray that transmitted, or None: one antenna
     compressed       False for data that still have the spectrum of the pulse (see `compress`)
+    image_area       m (3, 3): centre of the area to image, and from there to the middles of its sides along x and y,
+                     where the file that was read names one;  metadata  its XML
 
     A point of amplitude a at x gives a exp(-j 2 pi f (tau - tau_ref)), tau = (|tx - x| + |x - rx|)/c,
     tau_ref = 2 reference_range/c. ValueError names a field of wrong shape or value; samples that are
@@ -62,6 +64,8 @@ class PhaseHistory(NotebookTable):
     array: AntennaArray | None = None
     compressed: bool = True
     report: Report | None = None
+    image_area: NDArray[np.float64] | None = None
+    metadata: str | None = None
     # the array that rx is where it was given as None; dataclasses.replace hands it on, and tells a new rx from the old
     _rx_of_tx: NDArray[np.float64] | None = field(default=None, repr=False)
 
@@ -86,6 +90,8 @@ class PhaseHistory(NotebookTable):
             array: AntennaArray | None = None,
             compressed: bool = True,
             report: Report | None = None,
+            image_area: ArrayLike | None = None,
+            metadata: str | None = None,
             _rx_of_tx: ArrayLike | None = None,
         ) -> None: ...
 
@@ -146,6 +152,13 @@ class PhaseHistory(NotebookTable):
         self._set("compressed", validation.flag("compressed", self.compressed))
         if self.report is not None:
             validation.instance("report", self.report, Report)
+        if self.image_area is not None:
+            area = validation.array("image_area", self.image_area, np.float64, (3, 3))
+            if not np.linalg.norm(np.cross(area[1], area[2])) > 0:
+                raise ValueError(f"image_area has the sides {area[1]} and {area[2]}, which span no plane")
+            self._set("image_area", validation.sealed(area))
+        if self.metadata is not None:
+            validation.instance("metadata", self.metadata, str)
         if self.waveform is not None and not hasattr(self.waveform, "matched_spectrum"):
             raise TypeError(f"waveform is a {type(self.waveform).__name__}; give a sarcl.Waveform or None")
         if self.array is not None and not hasattr(self.array, "offsets_at"):
@@ -396,13 +409,50 @@ class PhaseHistory(NotebookTable):
         signal = np.fft.fftshift(np.fft.ifft(spectrum, axis=1), axes=1) * n
         return (delay if len(delay) > 1 else delay[0]), signal
 
-    def save(self, path: PathLike) -> None:
-        """Write a lossless HDF5 file that `sarcl.read` opens; samples are copied in blocks of rows.
+    def save(
+        self,
+        path: PathLike,
+        *,
+        origin: ArrayLike | None = None,
+        axes: ArrayLike | None = None,
+        metadata: Mapping[str, ArrayLike | np.datetime64] | None = None,
+        domain: Literal["FX", "TOA"] = "FX",
+        sgn: Literal[-1, 1] = -1,
+        version: Literal["1.0.1", "1.1.0"] = "1.1.0",
+    ) -> None:
+        """Write a lossless HDF5 file, or a CPHD file, that `sarcl.read` opens; samples are copied in blocks of rows.
 
+        CPHD (a path that ends in .cphd; pip install sarcl[formats]) keeps samples in complex64, geometry, times and
+        polarisations, in Earth-fixed coordinates, and takes
+
+        origin    (latitude, longitude, height), degrees and m on WGS84, of local coordinates; none for Earth-fixed ones
+        axes      Earth-fixed unit vectors along local x, y, z (3, 3); None: east, north, up at the origin
+        metadata  by CPHD's own names: CollectorName, CoreName, ModeType, Classification, ReleaseInfo, CollectionStart
+                  (UTC of time 0), and where the echoes lack them TxPol, RcvPol; TxTime (n_rows,), TxVel and RcvVel
+                  (n_rows, 3); SRPPos (3,), in their coordinates. ImageArea ((x1, y1), (x2, y2)), m, IlluminatorName,
+                  ModeID, CountryCode and CollectType may be given
+        domain    "FX" or "TOA": samples by frequency, or by time of arrival
+        sgn       -1 or +1: the sign of the phase of a return
+        version   "1.1.0" or "1.0.1"
+
+        ValueError for what a CPHD file must have and the echoes lack, with the key of metadata= that gives it.
         `path` may be the file that the samples are read from. Raises ValueError for a NaN or Inf in lazily read
         samples, and FileNotFoundError, PermissionError and the like before anything is written. On any exception `path`
         is unchanged.
         """
+        if formats.named(arguments.path("path", path), [formats.CPHD]) is not None:
+            from ..io.cphd import writing
+            from .cphd.collection import collection_of
+
+            collection = collection_of(
+                self, origin=origin, axes=axes, metadata=metadata, domain=domain, sgn=sgn, version=version
+            )
+            writing.save(path, collection, self.read)
+            return
+        if not (origin is axes is metadata is None) or (domain, sgn, version) != ("FX", -1, "1.1.0"):
+            raise ValueError(
+                f"origin, axes, metadata, domain, sgn and version are for CPHD, and {str(path)!r} does not end in .cphd"
+            )
         writer = formats.writer_functions(path, "phase history").EchoWriter(
             path, self.n_rows, self.n_samples, self.samples.dtype
         )
@@ -424,4 +474,6 @@ def phase_history_fields(raw: PhaseHistory) -> dict[str, Any]:
         "waveform": None if raw.waveform is None else formats.fields_of(raw.waveform),
         "array": None if raw.array is None else formats.fields_of(raw.array),
         "report": raw.report,
+        "image_area": raw.image_area,
+        "metadata": raw.metadata,
     }

@@ -1,0 +1,6 @@
+"""Phase histories as CPHD files. sarcl/io/cphd has the files themselves.
+
+For other folders:
+
+    collection     a phase history as the collection of a CPHD file; what is missing is refused
+"""

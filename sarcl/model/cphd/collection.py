@@ -1,0 +1,252 @@
+"""A phase history as the collection of a CPHD file: Earth-fixed, with names and times; what is missing is refused."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...base import validation, wgs84
+from ...base.constants import SPEED_OF_LIGHT
+from ...io.cphd.writing import OVERSAMPLING, ChannelRows, Collection
+from ..dates import date
+
+if TYPE_CHECKING:
+    from ..phase_history import PhaseHistory
+
+MODES = ("SPOTLIGHT", "STRIPMAP", "DYNAMIC STRIPMAP")
+REQUIRED = ("CollectorName", "CoreName", "ModeType", "Classification", "ReleaseInfo")
+OPTIONAL = ("IlluminatorName", "ModeID", "CountryCode", "CollectType")
+OTHERS = ("CollectionStart", "TxPol", "RcvPol", "SRPPos", "ImageArea", "TxTime", "TxVel", "RcvVel")
+POLARIZATIONS = {letter: letter for letter in "HVXY"} | {"R": "RHC", "L": "LHC"}
+LATER = {letter: letter for letter in "SE"}  # since version 1.1.0
+STEPS, MET = 20, 1e-7  # iterations, and error in m, of the point at which reference ranges meet
+SAME = 1.0  # m: farther from where the sender has moved on to, the receiver is on another platform
+
+
+def collection_of(
+    raw: PhaseHistory,
+    *,
+    origin: ArrayLike | None = None,
+    axes: ArrayLike | None = None,
+    metadata: Mapping[str, ArrayLike | np.datetime64] | None = None,
+    domain: Literal["FX", "TOA"] = "FX",
+    sgn: Literal[-1, 1] = -1,
+    version: Literal["1.0.1", "1.1.0"] = "1.1.0",
+) -> Collection:
+    """The arguments of `PhaseHistory.save` for CPHD, checked, and all that the file says."""
+    validation.choice("domain", domain, ("FX", "TOA"))
+    validation.choice("version", version, ("1.0.1", "1.1.0"))
+    if sgn not in (-1, 1) or isinstance(sgn, bool):
+        raise ValueError(f"sgn is {sgn!r}; give -1, or +1: then the samples are conjugated")
+    _check_samples(raw)
+    words = _Words(metadata)
+    corner, local = _frame(raw, origin, axes)
+    time = _per_row(raw, words, "time", "TxTime", ())
+    velocities = [
+        _per_row(raw, words, name, key, (3,)) @ local
+        for name, key in (("tx_velocity", "TxVel"), ("rx_velocity", "RcvVel"))
+    ]
+    tx, rx = (corner + positions @ local for positions in (raw.tx, raw.rx))
+    point = _reference_point(raw, words, corner, local, is_local=origin is not None)
+    early = max(0, int(np.ceil(-time.min())))  # whole seconds by which the file's clock starts before time 0
+    start = words.start() - np.timedelta64(early, "s")
+    names = {key: words.text(key) for key in REQUIRED} | {k: words.text(k) for k in OPTIONAL if k in words.values}
+    validation.choice("metadata['ModeType']", names["ModeType"], MODES)
+    delay = (np.linalg.norm(tx - point, axis=1) + np.linalg.norm(point - rx, axis=1)) / SPEED_OF_LIGHT
+    moved = np.linalg.norm(rx - tx - velocities[0] * delay[:, None], axis=1)
+    is_one = raw.is_monostatic or bool((moved < SAME).all())
+    names.setdefault("CollectType", "MONOSTATIC" if is_one else "BISTATIC")
+    validation.choice("metadata['CollectType']", names["CollectType"], ("MONOSTATIC", "BISTATIC"))
+    surface, area = _surface(raw, words, point, local, is_local=origin is not None)
+    return Collection(
+        channels=_channels(raw, words, time, version),
+        n_samples=raw.n_samples,
+        frequency=raw.frequency,
+        frequency_step=raw.frequency_step,
+        reference_range=raw.reference_range,
+        time=time + early,
+        tx=tx,
+        rx=rx,
+        tx_velocity=velocities[0],
+        rx_velocity=velocities[1],
+        reference_point=point,
+        surface=surface,
+        area=area,
+        start=start,
+        names=names,
+        domain=domain,
+        sgn=int(sgn),
+        version=version,
+    )
+
+
+class _Words:
+    """What metadata= gives, by CPHD's names. ValueError for a name that is not one of them, or that is missing."""
+
+    def __init__(self, metadata: Mapping[str, ArrayLike | np.datetime64] | None) -> None:
+        self.values: dict[str, Any] = dict(metadata or {})
+        known = (*REQUIRED, *OPTIONAL, *OTHERS)
+        unknown = [key for key in self.values if key not in known]
+        if unknown:
+            raise ValueError(
+                f"metadata has {unknown[0]!r}, which is no name that CPHD lacks here; it takes {', '.join(known)}"
+            )
+
+    def need(self, key: str, why: str) -> Any:
+        """The value of a key; ValueError where there is none."""
+        if self.values.get(key) is None:
+            raise ValueError(f"{why}, which a CPHD file must have; give metadata={{{key!r}: ...}}")
+        return self.values[key]
+
+    def text(self, key: str) -> str:
+        """The text of a key, not empty."""
+        value = self.need(key, f"the echoes have no {key}")
+        if not isinstance(value, str) or not value.strip() or not value.isprintable():
+            raise ValueError(f"metadata[{key!r}] is {value!r:.80}; give a text of one line")
+        return value
+
+    def start(self) -> np.datetime64:
+        """CollectionStart: UTC of time 0."""
+        return date(self.need("CollectionStart", "the echoes have no date (UTC of time 0)"))
+
+
+def _check_samples(raw: PhaseHistory) -> None:
+    """ValueError for what CPHD cannot say of samples."""
+    if not raw.compressed:
+        raise ValueError("the echoes are not compressed, and CPHD holds compressed ones; call sarcl.compress first")
+    if raw.weight is not None and not (raw.weight == 1).all():
+        raise ValueError(
+            "weight differs from 1, which CPHD has no place for; give dataclasses.replace(raw, weight=None)"
+        )
+
+
+def _frame(raw: PhaseHistory, origin: ArrayLike | None, axes: ArrayLike | None) -> tuple[np.ndarray, np.ndarray]:
+    """Origin, m (3,), and axes (3, 3) of the frame of the echoes, Earth-fixed: position = origin + local @ axes."""
+    is_earth_fixed = wgs84.is_earth_fixed(raw.tx[0])
+    if origin is None:
+        if axes is not None or not is_earth_fixed:
+            raise ValueError(
+                "the echoes are in local coordinates, and CPHD is Earth-fixed; give origin=(latitude, longitude, "
+                "height) of their origin, degrees and m on WGS84 (axes=: east, north and up unless given)"
+            )
+        return np.zeros(3), np.eye(3)
+    if is_earth_fixed:
+        raise ValueError("origin places local coordinates, and the echoes are Earth-fixed already; leave it out")
+    latitude, longitude, height = validation.array("origin", origin, np.float64, (3,)).tolist()
+    if not -90 <= latitude <= 90 or not -180 <= longitude <= 360:
+        raise ValueError(
+            f"origin is ({latitude:g}, {longitude:g}, {height:g}); give latitude, longitude, deg, height, m"
+        )
+    if axes is None:
+        rows = wgs84.local_axes(longitude, latitude)
+    else:
+        rows = validation.array("axes", axes, np.float64, (3, 3))
+        if not np.allclose(rows @ rows.T, np.eye(3), atol=1e-9) or np.linalg.det(rows) < 0:
+            raise ValueError(
+                "axes are not three orthogonal unit vectors of a right-handed frame, Earth-fixed, x, y, z by row"
+            )
+    return wgs84.ecef(longitude, latitude, height), rows
+
+
+def _per_row(raw: PhaseHistory, words: _Words, name: str, key: str, tail: tuple[int, ...]) -> np.ndarray:
+    """A field of the rows, of the echoes or of metadata; ValueError where neither has it, or both."""
+    value = getattr(raw, name)
+    if value is not None and key in words.values:
+        raise ValueError(f"metadata has {key!r}, and the echoes have {name}; leave it out")
+    if value is None:
+        value = words.need(key, f"the echoes have no {name} (per row)")
+    return validation.array(f"metadata[{key!r}]", value, np.float64, (raw.n_rows, *tail))
+
+
+def _reference_point(
+    raw: PhaseHistory, words: _Words, corner: np.ndarray, local: np.ndarray, is_local: bool
+) -> np.ndarray:
+    """SRPPos, Earth-fixed, m (3,): given, or the centre of the image area, or on z = 0."""
+    if words.values.get("SRPPos") is not None:
+        return corner + validation.array("metadata['SRPPos']", words.values["SRPPos"], np.float64, (3,)) @ local
+    if raw.image_area is not None:
+        return np.asarray(corner + raw.image_area[0] @ local)
+    if is_local:
+        return np.asarray(corner + _meeting_point(raw) @ local)
+    words.need("SRPPos", "Earth-fixed echoes have no reference point (m, in their coordinates, near the scene)")
+    raise AssertionError
+
+
+def _meeting_point(raw: PhaseHistory) -> np.ndarray:
+    """The point of z = 0, m (3,), whose ranges are the reference ranges; the origin where there is none."""
+    point = np.zeros(3)
+    for _ in range(STEPS):
+        to_tx, to_rx = point - raw.tx, point - raw.rx
+        r_tx, r_rx = np.linalg.norm(to_tx, axis=1), np.linalg.norm(to_rx, axis=1)
+        excess = (r_tx + r_rx) / 2 - raw.reference_range
+        if np.abs(excess).max() < MET:
+            return point
+        gradient = (to_tx / r_tx[:, None] + to_rx / r_rx[:, None]) / 2
+        point[:2] -= np.linalg.lstsq(gradient[:, :2], excess, rcond=None)[0]
+    return np.zeros(3)
+
+
+def _surface(
+    raw: PhaseHistory, words: _Words, point: np.ndarray, local: np.ndarray, is_local: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """Axes (2, 3) of the plane of the scene through the reference point, and corners (2, 2) of its image area, m.
+
+    The plane and extent of the echoes' image area; else x and y of local coordinates, or east and north, and the extent
+    that the frequency step leaves unambiguous.
+    """
+    half = np.full(2, float(raw.swath.min()) / 2 / OVERSAMPLING)
+    if raw.image_area is not None:
+        sides = raw.image_area[1:] @ local
+        half = np.linalg.norm(sides, axis=1)
+        x_axis = sides[0] / half[0]
+        y_axis = sides[1] - (sides[1] @ x_axis) * x_axis
+        surface = np.stack([x_axis, y_axis / np.linalg.norm(y_axis)])
+    elif is_local:
+        surface = local[:2]
+    else:
+        longitude, latitude, _ = wgs84.geodetic(point)
+        surface = wgs84.local_axes(float(longitude), float(latitude))[:2]
+    area = np.stack([-half, half])
+    if words.values.get("ImageArea") is not None:
+        area = validation.array("metadata['ImageArea']", words.values["ImageArea"], np.float64, (2, 2))
+        if not (area[0] < area[1]).all():
+            raise ValueError(
+                f"metadata['ImageArea'] is {area.tolist()}; give ((x1, y1), (x2, y2)), x1 < x2, y1 < y2, m"
+            )
+    return surface, area
+
+
+def _channels(raw: PhaseHistory, words: _Words, time: np.ndarray, version: str) -> tuple[ChannelRows, ...]:
+    """Rows of equal transmitting and receiving channel and polarisation, in order; their times must increase."""
+    letters = POLARIZATIONS | (LATER if version == "1.1.0" else {})
+    if raw.polarization is None:
+        pair = words.text("TxPol"), words.text("RcvPol")
+        labels = np.full(raw.n_rows, ":".join(pair))
+        names = {":".join(pair): pair}
+        unknown = [name for name in pair if name not in letters.values()]
+    else:
+        labels = raw.polarization
+        distinct = sorted(set(labels.tolist()))
+        unknown = [label for label in distinct if len(label) != 2 or not set(label) <= set(letters)]
+        names = {label: (letters[label[0]], letters[label[1]]) for label in distinct if label not in unknown}
+    if unknown:
+        raise ValueError(
+            f"polarization {unknown[0]!r} is not one of CPHD {version}, two of {', '.join(letters.values())}"
+        )
+    zeros = np.zeros(raw.n_rows, int)
+    tx, rx = (zeros if each is None else each for each in (raw.tx_channel, raw.rx_channel))
+    rows_of: dict[tuple[int, int, str], list[int]] = {}
+    for row, key in enumerate(zip(tx.tolist(), rx.tolist(), labels.tolist(), strict=True)):
+        rows_of.setdefault(key, []).append(row)
+    channels = []
+    for number, (key, members) in enumerate(rows_of.items()):
+        rows = np.array(members)
+        if not (np.diff(time[rows]) > 0).all():
+            raise ValueError(
+                f"times of the rows of channel {key} do not increase, as CPHD wants; sort the rows by time"
+            )
+        channels.append(ChannelRows(f"{number + 1}", names[key[2]], (key[0], key[1]), rows))
+    return tuple(channels)

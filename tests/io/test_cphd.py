@@ -1,0 +1,330 @@
+"""CPHD: files that sarcl writes, as sarkit's checker judges them, and focused by sarcl and by the standard alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+import sarcl
+
+cphd = pytest.importorskip("sarkit.cphd", reason="no sarkit: pip install sarcl[formats]")
+pytestmark = pytest.mark.filterwarnings("ignore:(read|open)_text is deprecated:DeprecationWarning")  # within sarkit
+verification = pytest.importorskip("sarkit.verification")
+
+C = 299792458.0
+METADATA = {
+    "CollectorName": "sarcl",
+    "CoreName": "targets",
+    "ModeType": "SPOTLIGHT",
+    "Classification": "UNCLASSIFIED",
+    "ReleaseInfo": "UNRESTRICTED",
+    "CollectionStart": "2026-01-02T03:04:05.250000",
+}
+ORIGIN = 47.2, 8.5, 420.0  # latitude, longitude, height
+OFFSETS = np.array([[0.0, 0.0], [5.0, -4.0], [-7.0, 6.0]])  # m, of targets on the plane: x, y
+AMPLITUDES = np.array([1.0, 0.8, 1.2])
+VARIANTS = [(domain, sgn) for domain in ("FX", "TOA") for sgn in (-1, 1)]
+
+
+@dataclass(frozen=True)
+class Case:
+    """Echoes of known targets, and what saves them."""
+
+    raw: sarcl.PhaseHistory
+    targets: np.ndarray  # Earth-fixed, m (n, 3)
+    options: dict
+
+    @property
+    def resolution(self) -> float:
+        return C / 2 / float(self.raw.bandwidth[0])  # m, of range; the arcs are as long as the azimuth needs
+
+
+def two_way(tx, rx, x):
+    """Path from the sender to a point and on to the receiver, m (n,)."""
+    return np.linalg.norm(tx - x, axis=1) + np.linalg.norm(rx - x, axis=1)
+
+
+def echoes(tx, rx, targets, reference, time, velocities):
+    """The sum over targets, term by term, in float64."""
+    n, bandwidth, center = 96, 150e6, 9.6e9
+    f = center - bandwidth / 2 + (np.arange(n) + 0.5) * bandwidth / n
+    ranges = two_way(tx, rx, reference) / 2
+    delays = [2 * np.pi / C * (two_way(tx, rx, x) - 2 * ranges)[:, None] for x in targets]
+    samples = sum(a * np.exp(-1j * delay * f) for a, delay in zip(AMPLITUDES, delays, strict=True))
+    return sarcl.PhaseHistory(
+        samples.astype(np.complex64),
+        frequency=f[0],
+        frequency_step=bandwidth / n,
+        tx=tx,
+        rx=rx,
+        reference_range=ranges,
+        time=time,
+        tx_velocity=velocities[0],
+        rx_velocity=velocities[1],
+        polarization=np.full(len(tx), "VH"),
+    )
+
+
+def aircraft(is_bistatic):
+    """10 km away on a straight line, in local coordinates; a receiver on another aircraft."""
+    time = np.linspace(-1.0, 1.0, 161)
+    velocity = np.array([10.0, 100.0, 1.0])
+    tx = np.array([-8e3, 500.0, 6e3]) + time[:, None] * velocity
+    other = np.array([-5.0, 90.0, 0.0])
+    rx = np.array([-6e3, -4e3, 5e3]) + time[:, None] * other if is_bistatic else None
+    corner, axes = sarcl.wgs84.ecef(ORIGIN[1], ORIGIN[0], ORIGIN[2]), sarcl.wgs84.local_axes(ORIGIN[1], ORIGIN[0])
+    local = np.pad(OFFSETS, ((0, 0), (0, 1)))
+    velocities = np.tile(velocity, (161, 1)), np.tile(other if is_bistatic else velocity, (161, 1))
+    raw = echoes(tx, tx if rx is None else rx, local, np.zeros(3), time, velocities)
+    return Case(raw, corner + local @ axes, {"origin": ORIGIN})
+
+
+def orbit(is_bistatic):
+    """800 km high, Earth-fixed, the receiver where the echo arrives; or on a second satellite, behind the first."""
+    path = sarcl.Orbit.kepler(semi_major_axis=7178e3, eccentricity=0.001, inclination=1.7)
+    track = path.trajectory(start=10.0, prf=60.0, n_pulses=121)
+    center = path.geolocate([11.0], [950e3], side="right")[0]
+    longitude, latitude, _ = (float(v) for v in sarcl.wgs84.geodetic(center))
+    axes = sarcl.wgs84.local_axes(longitude, latitude)
+    targets = center + np.pad(OFFSETS, ((0, 0), (0, 1))) @ axes
+    time = track.times
+    delay = 2 * np.linalg.norm(track.positions - center, axis=1) / C
+    late = time + delay - (12.0 if is_bistatic else 0.0)
+    rx, rx_velocity = path.positions(late), path.velocities(late)
+    raw = echoes(track.positions, rx, targets, center, time, (track.velocities, rx_velocity))
+    return Case(raw, targets, {"metadata": {**METADATA, "SRPPos": center}})
+
+
+CASES = {"aircraft": aircraft, "orbit": orbit}
+
+
+QUICK = ("aircraft", True), ("orbit", False)  # with SLOW, both platforms, mono- and bistatic
+SLOW = ("aircraft", False), ("orbit", True)
+
+
+@pytest.fixture(
+    scope="module",
+    params=[*QUICK, *(pytest.param(each, marks=pytest.mark.slow) for each in SLOW)],
+    ids=lambda p: f"{p[0]}-{'bi' if p[1] else 'mono'}static",
+)
+def case(request):
+    name, is_bistatic = request.param
+    return CASES[name](is_bistatic)
+
+
+def saved(case, path, **options):
+    case.raw.save(path, **{"metadata": METADATA, **case.options, **options})
+    return path
+
+
+def channel_of(path):
+    """The first channel as sarkit reads it: tree, signal, per-vector parameters."""
+    with open(path, "rb") as file, cphd.Reader(file) as reader:
+        tree = reader.metadata.xmltree
+        name = tree.findtext("{*}Data/{*}Channel/{*}Identifier")
+        return (tree, *reader.read_channel(name))
+
+
+def errors(path):
+    """Errors and warnings of sarkit's checker by name."""
+    with open(path, "rb") as file:
+        judge = verification.CphdConsistency.from_file(file, thorough=True)
+        judge.check()
+    kinds = {"Error": set(), "Warning": set()}
+    for name, outcome in judge.failures().items():
+        for detail in outcome["details"]:
+            if not detail["passed"]:
+                kinds[detail["severity"]].add(name)
+    return kinds["Error"], kinds["Warning"]
+
+
+@pytest.mark.parametrize("version", ["1.0.1", "1.1.0"])
+@pytest.mark.parametrize(("domain", "sgn"), VARIANTS)
+def test_the_checker_of_sarkit_finds_no_error(case, tmp_path, domain, sgn, version):
+    path = saved(case, tmp_path / "x.cphd", domain=domain, sgn=sgn, version=version)
+    wrong, advice = errors(path)
+    assert wrong == set()
+    assert advice <= {"check_image_grid_exists"}  # a grid of pixels is the reader's choice
+
+
+def test_a_receiver_on_another_platform_is_bistatic(case, request, tmp_path):
+    tree, *_ = channel_of(saved(case, tmp_path / "x.cphd"))
+    kind = "BISTATIC" if request.node.callspec.params["case"][1] else "MONOSTATIC"
+    assert tree.findtext("{*}CollectionID/{*}CollectType") == kind
+
+
+def test_echoes_arrive_when_light_has_gone_to_the_reference_point_and_on(case, tmp_path):
+    *_, pvp = channel_of(saved(case, tmp_path / "x.cphd"))
+    path = two_way(pvp["TxPos"], pvp["RcvPos"], pvp["SRPPos"])
+    np.testing.assert_allclose(pvp["RcvTime"] - pvp["TxTime"], path / C, rtol=0, atol=1e-12)
+    assert not pvp["aFDOP"].any()  # not given: the simple phase model holds
+
+
+@pytest.mark.parametrize(("domain", "sgn"), VARIANTS)
+def test_samples_and_geometry_return(case, tmp_path, domain, sgn):
+    back = sarcl.read(saved(case, tmp_path / "x.cphd", domain=domain, sgn=sgn))
+    raw, samples = case.raw, back.read(0, back.n_rows)
+    assert back.samples.shape == raw.samples.shape
+    np.testing.assert_allclose(back.frequency, raw.frequency, rtol=1e-15)
+    np.testing.assert_allclose(back.reference_range, raw.reference_range, rtol=0, atol=2e-8)
+    assert np.linalg.norm(samples - raw.samples) <= 2e-6 * np.linalg.norm(raw.samples)
+    assert set(back.polarization) == {"VH"}
+    np.testing.assert_allclose(np.diff(back.time), np.diff(raw.time), atol=1e-9)
+    assert back.is_monostatic == raw.is_monostatic
+
+
+@pytest.mark.parametrize(("domain", "sgn"), VARIANTS)
+def test_targets_are_where_they_were_by_the_equations_of_the_standard(case, tmp_path, domain, sgn):
+    """Files as sarkit reads them, focused with Phase(fx) = SGN fx dTOA, Phase(peak) = SGN fxC dTOA, without sarcl."""
+    _, signal, pvp = channel_of(saved(case, tmp_path / "x.cphd", domain=domain, sgn=sgn))
+    reference = two_way(pvp["TxPos"], pvp["RcvPos"], pvp["SRPPos"])
+    axis = pvp["SC0"][:, None] + np.arange(signal.shape[1]) * pvp["SCSS"][:, None]
+    for target, amplitude in zip(case.targets, AMPLITUDES, strict=True):
+        dtoa = (two_way(pvp["TxPos"], pvp["RcvPos"], target) - reference) / C
+        assert (np.abs(dtoa) < np.minimum(-pvp["TOA1"], pvp["TOA2"])).all()
+        if domain == "FX":
+            terms = (signal * np.exp(-2j * np.pi * sgn * axis * dtoa[:, None])).mean(axis=1)
+        else:
+            center, band = (pvp["FX1"] + pvp["FX2"]) / 2, pvp["FX2"] - pvp["FX1"]
+            kernel = np.sinc(band[:, None] * (axis - dtoa[:, None])) * (band * pvp["SCSS"])[:, None]
+            terms = (signal * kernel).sum(axis=1) * np.exp(-2j * np.pi * sgn * center * dtoa)
+        assert abs(terms.mean()) == pytest.approx(amplitude, abs=0.12)
+        moved = target + np.array([2.0, 0, 0]) * case.resolution
+        shifted = (two_way(pvp["TxPos"], pvp["RcvPos"], moved) - reference) / C
+        if domain == "FX":
+            assert abs((signal * np.exp(-2j * np.pi * sgn * axis * shifted[:, None])).mean()) < 0.5
+
+
+@pytest.mark.parametrize(("domain", "sgn"), VARIANTS)
+def test_targets_are_focused_and_located(case, tmp_path, domain, sgn):
+    path = saved(case, tmp_path / "x.cphd", domain=domain, sgn=sgn)
+    raw = sarcl.read(path)
+    tree, *_ = channel_of(path)
+    longitude, latitude, _ = sarcl.wgs84.geodetic(raw.image_area[0])
+    east, _, up = sarcl.wgs84.local_axes(float(longitude), float(latitude))
+    for target in case.targets:
+        grid = sarcl.ImageGrid.plane(center=target, shape=128, spacing=case.resolution / 4, normal=up, x_axis=east)
+        response = sarcl.measure(sarcl.backproject(raw, grid), near=target)
+        error = cphd.ecf_to_iac(tree, response.position) - cphd.ecf_to_iac(tree, target)
+        assert np.linalg.norm(error[:2]) < min(case.resolution / 10, 0.03)
+
+
+def test_the_default_grid_is_the_image_area(case, tmp_path):
+    words = {**METADATA, **case.options.get("metadata", {}), "ImageArea": ((-12, -9), (12, 9))}
+    path = saved(case, tmp_path / "x.cphd", metadata=words)
+    grid = sarcl.default_grid(sarcl.read(path))
+    sides = np.array(grid.shape) * grid.spacing
+    np.testing.assert_allclose(sides, (18, 24), atol=max(grid.spacing))
+    tree, *_ = channel_of(path)
+    corner = cphd.ecf_to_iac(tree, grid.at(0, 0))
+    np.testing.assert_allclose(corner, (-12, -9, 0), atol=max(grid.spacing))
+
+
+def test_references_apart_from_the_point_are_moved_to_it_exactly(tmp_path):
+    """A reference point 40 m off: the same targets, in a swath that is not centred on it."""
+    case = aircraft(False)
+    far = {**METADATA, "SRPPos": (25.0, -30.0, 4.0)}
+    for domain, sgn in VARIANTS:
+        path = saved(case, tmp_path / "x.cphd", metadata=far, domain=domain, sgn=sgn)
+        assert errors(path)[0] == set()
+        raw = sarcl.read(path)
+        grid = sarcl.ImageGrid.points(case.targets)
+        values = sarcl.backproject(raw, grid, tolerance=1e-5).normalized()
+        direct = sarcl.backproject(case.raw, sarcl.ImageGrid.points(np.pad(OFFSETS, ((0, 0), (0, 1)))), tolerance=1e-5)
+        np.testing.assert_allclose(np.abs(values), np.abs(direct.normalized()), atol=2e-4)
+
+
+def test_channels_are_polarisations_and_elements(tmp_path):
+    case = aircraft(False)
+    n = case.raw.n_rows
+    parts = [
+        replace(case.raw, polarization=np.full(n, p), rx_channel=np.full(n, k), tx_channel=np.zeros(n, int))
+        for k, p in ((0, "HH"), (0, "HV"), (1, "RL"))
+    ]
+    raw = sarcl.concatenate(parts)
+    order = np.arange(3 * n).reshape(3, n).T.ravel()  # rows by time, channels in turns
+    path = tmp_path / "x.cphd"
+    raw[order].save(path, origin=ORIGIN, metadata=METADATA)
+    assert errors(path)[0] == set()
+    back = sarcl.read(path)
+    assert back.n_rows == 3 * n
+    for part in parts:
+        label, channel = str(part.polarization[0]), int(part.rx_channel[0])
+        rows = back.select(polarization=label, channel=channel)
+        assert np.linalg.norm(rows.read(0, n) - part.samples) < 1e-6 * np.linalg.norm(part.samples)
+        assert sarcl.read(path, polarization=label).n_rows == n
+    assert sarcl.read(path, channel="3").polarization[0] == "RL"
+    assert sarcl.read(path, channel=0).n_rows == 2 * n
+    with pytest.raises(ValueError, match=r"has no channel '7': it has channel '1' \(H:H\)"):
+        sarcl.read(path, channel="7")
+
+
+def test_elements_of_a_frequency_diverse_array_are_channels_with_their_carriers(tmp_path):
+    array = sarcl.AntennaArray.linear(4, spacing=0.015, frequency_step=2e6, axis=(0, 1, 0))
+    pulse = sarcl.Waveform.tone(center=10e9, duration=5e-7)
+    track = sarcl.Trajectory.line(start=(-3e3, -20, 2e3), velocity=(0, 100, 0), prf=50.0, n_pulses=9)
+    raw = sarcl.echo(sarcl.Scene.points([[3.0, 2.0, 0.0]]), pulse, track, array=array, channels="separated")
+    raw.save(tmp_path / "x.cphd", origin=ORIGIN, metadata=METADATA)
+    assert errors(tmp_path / "x.cphd")[0] == set()
+    back = sarcl.read(tmp_path / "x.cphd")
+    for element in range(4):
+        part, same = back.select(sender=element), raw.select(sender=element)
+        np.testing.assert_array_equal(part.frequency, same.frequency)
+        np.testing.assert_allclose(part.read(0, 9), same.read(0, 9), atol=1e-6)
+
+
+@pytest.mark.parametrize("key", METADATA)
+def test_what_is_missing_is_refused_with_its_key(tmp_path, key):
+    words = {k: v for k, v in METADATA.items() if k != key}
+    with pytest.raises(ValueError, match=f"metadata={{'{key}'"):
+        aircraft(False).raw.save(tmp_path / "x.cphd", origin=ORIGIN, metadata=words)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("field", "key"),
+    [("time", "TxTime"), ("tx_velocity", "TxVel"), ("rx_velocity", "RcvVel"), ("polarization", "TxPol")],
+)
+def test_rows_that_are_missing_are_refused_with_their_key(tmp_path, field, key):
+    case = aircraft(False)
+    raw = replace(case.raw, **{field: None})
+    with pytest.raises(ValueError, match=f"metadata={{'{key}'"):
+        raw.save(tmp_path / "x.cphd", origin=ORIGIN, metadata=METADATA)
+    values = {"TxPol": "V", "RcvPol": "H"} if field == "polarization" else {key: getattr(case.raw, field)}
+    raw.save(tmp_path / "x.cphd", origin=ORIGIN, metadata={**METADATA, **values})
+    assert errors(tmp_path / "x.cphd")[0] == set()
+
+
+def test_wrong_arguments_are_refused(tmp_path):
+    raw = aircraft(False).raw
+    path = tmp_path / "x.cphd"
+    for options, words in (
+        ({"metadata": METADATA}, r"give origin=\(latitude"),
+        ({"origin": ORIGIN, "metadata": {**METADATA, "Colour": "red"}}, "metadata has 'Colour'"),
+        ({"origin": ORIGIN, "metadata": METADATA, "domain": "fx"}, "domain"),
+        ({"origin": ORIGIN, "metadata": METADATA, "sgn": 0}, "sgn is 0"),
+        ({"origin": ORIGIN, "metadata": METADATA, "version": "1.2.0"}, "version"),
+        ({"origin": (91, 0, 0), "metadata": METADATA}, "origin is"),
+        ({"origin": ORIGIN, "metadata": METADATA, "axes": -np.eye(3)}, "axes are not"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            raw.save(path, **options)
+    with pytest.raises(ValueError, match="are for CPHD"):
+        raw.save(tmp_path / "x.h5", origin=ORIGIN)
+    with pytest.raises(ValueError, match="not compressed"):
+        replace(raw, compressed=False).save(path, origin=ORIGIN, metadata=METADATA)
+    with pytest.raises(ValueError, match="times of the rows"):
+        raw[::-1].save(path, origin=ORIGIN, metadata=METADATA)
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_file_keeps_its_xml_through_hdf5(tmp_path):
+    case = aircraft(False)
+    raw = sarcl.read(saved(case, tmp_path / "x.cphd"))
+    assert "<CollectorName>sarcl</CollectorName>" in raw.metadata
+    raw.save(tmp_path / "x.h5")
+    back = sarcl.read(tmp_path / "x.h5")
+    assert back.metadata == raw.metadata
+    np.testing.assert_array_equal(back.image_area, raw.image_area)
