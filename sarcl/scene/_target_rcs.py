@@ -25,6 +25,7 @@ from ..base.constants import SPEED_OF_LIGHT
 
 FORMS = ("triangular", "square")  # of the plates of a trihedral
 Form = Literal["triangular", "square"]
+LEAST_TURN = 1e-7  # cycles along the fold: fewer change nothing, and would divide by 0
 LEAST_COSINE = 1e-300  # of the elevation: straight from above, the product with the lit length is 0, not NaN
 
 
@@ -53,13 +54,19 @@ def trihedral_rcs(
 def dihedral_rcs(size: ArrayLike, direction: ArrayLike, frequency: ArrayLike) -> NDArray[np.float64]:
     """Two reflections of `sarcl.shapes.dihedral(size)`; size (a, b), m, across and along the fold.
 
-    A = 2 a b min(x, z) |sinc(k b y)|, direction (x, y, z), sinc(v) = sin(v)/v. The last factor is the pattern of an
-    aperture of length b along the fold, for directions a few beamwidths about the plane across it.
+        A = 2 a min(x, z) |exp(j q (2 b - w)) sinc(q w) - 1|/(2 q),   w = a |y|/max(x, z) <= b,   q = 2 pi |y|/lambda
+
+    of direction (x, y, z), sinc(v) = sin(v)/v: 2 a b min(x, z) across the fold. A beam moves along the fold between
+    its plates, by up to w, so that a strip reflects a length of b - w to b. Where w would exceed b, A falls by b/w.
     """
     across, along = (validation.number(f"size[{i}]", v, above=0) for i, v in enumerate(_pair("size", size)))
     x, y, z = np.moveaxis(_directions(direction), -1, 0)
-    pattern = np.sinc(2 * along * y / _wavelength(frequency))
-    return _of_area(2 * across * along * np.maximum(np.minimum(x, z), 0) * pattern, frequency)
+    drift = across * np.abs(y) / np.maximum(np.maximum(x, z), LEAST_COSINE)
+    lost = np.minimum(drift, along)
+    q = 2 * np.pi * np.maximum(np.abs(y) / _wavelength(frequency), LEAST_TURN / along)
+    pattern = np.abs(np.exp(1j * q * (2 * along - lost)) * np.sinc(q * lost / np.pi) - 1) / (2 * q)
+    strip = across * np.maximum(np.minimum(x, z), 0) * np.where(drift > along, along / np.maximum(drift, along), 1.0)
+    return _of_area(2 * strip * pattern, frequency)
 
 
 def top_hat_rcs(
