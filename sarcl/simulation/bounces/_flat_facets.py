@@ -10,7 +10,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from ...base.vectors import cross, dot
+from ...base.vectors import cross, distinct, dot
 from ...scattering.physical_optics import normals_and_areas
 from ._polygons import Polygons
 
@@ -67,7 +67,7 @@ def closed(triangles: np.ndarray) -> np.ndarray:
 def _shared_edges(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Edges 3 i + j, from corner j of triangle i to the next one, and those that run the other way between the same
     places (n,), (n,), where there is one of each."""
-    places, corner = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
+    places, corner = distinct(triangles.reshape(-1, 3))
     corner = corner.reshape(-1, 3)
     begin, end = corner.ravel(), np.roll(corner, -1, axis=1).ravel()
     code, back = begin * len(places) + end, end * len(places) + begin
