@@ -665,6 +665,7 @@ def test_memory_too_small_for_one_row_names_what_would_do():
     assert sarcl.backproject(raw, GRID, max_bytes=enough * 1.05).data.shape == GRID.shape
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize(
     "grid", [sarcl.ImageGrid.plane(shape=(40, 5000), spacing=0.002), LISTED], ids=["wide", "listed"]
 )

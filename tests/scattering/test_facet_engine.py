@@ -46,6 +46,7 @@ def test_a_five_metre_plate_tilted_by_20_degrees(distance, elevation, tolerance)
     assert raw.report.predicted_error <= tolerance
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("material, bistatic", thinned([Material(), WET, Material(eps_r=3.0)], [True, False]))
 def test_every_polarisation_of_tilted_facets(device, material, bistatic):
     random = np.random.default_rng(3)
