@@ -1,4 +1,4 @@
-"""Parts of range_doppler against closed forms and twins: the window over apertures, and the drift of two looks."""
+"""Parts of range_doppler against closed forms and twins: windows over apertures, drift of two looks, sums."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sarcl.base.constants import SPEED_OF_LIGHT
-from sarcl.imaging.range_doppler import _map_drift
+from sarcl.imaging.range_doppler import _focus, _map_drift
 from sarcl.imaging.range_doppler._aperture_window import ApertureWindow
 from sarcl.numerics import windows
 from sarcl.reference import map_drift as twin
@@ -89,3 +89,14 @@ def test_a_moved_look_gives_the_factor_that_moves_it():
 
     looks = _map_drift.Looks(look(0.0), look(late), ranges, speeds, row, doppler, WAVE)
     assert _map_drift.factor_of(looks) == pytest.approx(factor, abs=2e-4)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("n", [5, 1024, 2500])
+def test_sums_are_those_of_the_equation(n, sign):
+    random = np.random.default_rng(n)
+    values = (random.normal(size=(n, 3)) + 1j * random.normal(size=(n, 3))).astype(np.complex64)
+    places, wanted, period = random.integers(-900_000, 900_000, n), np.array([-7, 0, 4, 123_456]), 333_000
+    found = _focus.sums(values, places, wanted, period, sign)
+    exact = np.exp(sign * 2j * np.pi * np.outer(wanted, places) / period) @ values
+    assert np.linalg.norm(found - exact) <= 4e-7 * np.linalg.norm(exact)
