@@ -76,6 +76,7 @@ def sampled_echo(*subjects, **options):
     return planned_within({"few_looks": 0}, sarcl.echo, *subjects, **options).run()
 
 
+@pytest.mark.filterwarnings("ignore:.*moves posts:sarcl.SarclWarning")
 @pytest.mark.parametrize("name", SCENES)
 def test_heights_change_no_shadow_on_rough_terrain(name, sampled):
     scene = SCENES[name]()
