@@ -17,7 +17,7 @@ def pytest_collection_modifyitems(config, items):
 
     Repeated tests run on no twin: twins run every value of every parameter with its quick partners. Of the twins that
     only the slow tests have, each runs every fourth combination of a test's values; the two run different ones where
-    there are enough. The quick tests run every other combination on the remaining twin, and costly ones on none.
+    there are enough. The quick tests run every third combination on the remaining twin, and costly ones on none.
     """
     left_out, combinations, quick = set(), defaultdict(list), defaultdict(list)
     for item in items:
@@ -33,7 +33,7 @@ def pytest_collection_modifyitems(config, items):
         left_out.update(item for at, item in enumerate(found) if (at - first) % 4)
     for found in quick.values():
         for at, item in enumerate(found):
-            if at % 2 or item.get_closest_marker("costly"):
+            if at % 3 or item.get_closest_marker("costly"):
                 item.add_marker(pytest.mark.slow)
     if left_out:
         config.hook.pytest_deselected(items=list(left_out))

@@ -109,6 +109,11 @@ class BackprojectPlan:
         """Its Forecast."""
         return forecast_of(self.task, self.options, self.chosen, sum(self.seconds.values()), self.run)
 
+    @property
+    def job(self) -> BlockJob:
+        """The image as a job that is computed in blocks."""
+        return image_job(self.task, self.chosen, self.options.tolerance)
+
     def pixels(self) -> NDArray[np.complexfloating]:
         """The pixels alone."""
         with ExitStack() as stack:
@@ -130,7 +135,7 @@ class BackprojectPlan:
         checkpoint = None
         if is_path(out):
             kept = True if self.piece else options.resume
-            checkpoint = Checkpoint(out, image_job(self.task, self.chosen, options.tolerance), kept)
+            checkpoint = Checkpoint(out, self.job, kept)
             stack.push(checkpoint)
         filler = self._filler(checkpoint, clock)
         if self.piece and checkpoint:
@@ -160,7 +165,7 @@ class BackprojectPlan:
     def _filler(self, checkpoint: Checkpoint | None, clock: Clock, progress: bool = True) -> BandFiller:
         """The filler of this task on its workers."""
         report = self.options.progress if progress else None
-        job = image_job(self.task, self.chosen, self.options.tolerance)
+        job = self.job
         return BandFiller(self._workers(job), job, checkpoint, clock, report)
 
     def _workers(self, job: BlockJob) -> WorkerPool:

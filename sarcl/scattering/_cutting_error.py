@@ -6,7 +6,7 @@ cancel. What differs from piece to piece does not cancel: it adds up at random p
 L would add up anew in a direction in which q L is a whole number of cycles, as those of a grating do. The period is
 2^(1/2) times the longest edge of right-angled pieces: no such direction exists where q edge is below 2^(1/2) pi.
 
-docs/theory/facets.md derives it; tests/scattering/test_cutting_error.py measures it against the exact integral.
+docs/theory/facets.md derives it; tests/scattering/test_facet_errors.py measures it against the exact integral.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@
   by all angles across it. A plane facet has one S, that of its centroid: the error is what H and V at its corners would
   make of S. Where both antennas are one and S is that of a conductor it cancels.
 
-docs/theory/facets.md says what follows; tests/scattering/test_direction_error.py measures it against finer facets.
+docs/theory/facets.md says what follows; tests/scattering/test_facet_errors.py measures it against finer facets.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from .facet_kinds import FacetView
 from .physical_optics import normals_and_areas, scattering_matrix, turned
 
 FACETS, PULSES = 200, 5  # samples
-FLOAT32_DIRECTION = 6e-8  # rad, rms: measured 4e-8 to 7e-8 by tests/scattering/test_direction_error.py
+FLOAT32_DIRECTION = 6e-8  # rad, rms: measured 4e-8 to 7e-8 by tests/scattering/test_facet_errors.py
 STEEP = 0.5  # sine of the angle between line of sight and vertical: above, H turns no faster than directions do
 MOST_PIECES = 4096  # of the sampled facets, cut more finely towards the vertical through an antenna
 SHARP = 0.3  # rad of turn over one piece: beyond, errors do not fall with the square of its size

@@ -4,7 +4,7 @@ A tolerance is relative to the facets as they are given, of which neighbours in 
 one: where a plate ends, and not how a mesh divides it, is what its echo depends on. Facets and their pieces make more
 edges, whose echoes cancel again; their errors do not. The gain says by how much their norm is larger.
 
-docs/theory/facets.md derives it; tests/scattering/test_cutting_error.py measures it.
+docs/theory/facets.md derives it; tests/scattering/test_facet_errors.py measures it.
 """
 
 from __future__ import annotations

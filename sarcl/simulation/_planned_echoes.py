@@ -6,16 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from ..base.errors import ToleranceUnreachable
 from ..base.stage_timer import Clock
 from ..numerics import cost_model
 from ..opencl.device import Device
-from ..scattering.facet_kinds import coherent
 from ..scattering.rough_pieces import RoughPieces
 from ..scene import terrain
-from ..scene.triangles import areas
 from ._single_channel import SingleChannel, SingleEchoes
 from .channels.array_channels import ArrayChannels
 from .channels.array_channels import Method as ArrayMethod
@@ -25,9 +21,6 @@ from .scene_echoes import SceneEchoes
 from .scene_plan import ScenePlan, planned_scene, samples_shadows
 from .scene_preparation import prepare_scene
 
-# Pieces per facet, over area / edge^2: isosceles right triangles that are bisected until their longest side is shorter
-# than the edge have sides of 0.71 to 1 edge
-PER_EDGE = 5.5
 Channels = SingleChannel | ArrayChannels
 Method = SingleEchoes | ArrayMethod
 
@@ -124,7 +117,7 @@ class EchoWork(NamedTuple):
         scene, runs = planned.scene, planned.method.runs
         request, seen = scene.request, scene.seen
         n_points = len(seen.scene.positions) if request.same else 0
-        smooth, rough = pieces_of(scene)
+        smooth, rough = scene.n_pieces()
         device = None if scene.subdivision is None else scene.subdivision.device
         on_device = device is not None and RoughPieces.suited(device, seen.scene).any()
         cut_rough = cost_model.CUT_PIECE_ON_DEVICE if on_device else cost_model.CUT_PIECE
@@ -155,19 +148,6 @@ def points_cost(scene: ScenePlan) -> tuple[float, bool]:
         return PointCosts.of(len(positions), *case).direct, False
     cost, by_levels = expected_method(positions, *case, request.device)
     return cost, by_levels or request.method == "factorized"
-
-
-def pieces_of(scene: ScenePlan) -> tuple[float, float]:
-    """About the numbers of pieces of coherent and of other facets."""
-    subdivision, facets = scene.subdivision, scene.seen.scene
-    if subdivision is None:
-        return 0.0, 0.0
-    is_smooth = coherent(facets)
-    if not subdivision.cuts:
-        return float(is_smooth.sum()), float((~is_smooth).sum())
-    edge = np.where(is_smooth, subdivision.plan.max_edge, min(subdivision.cell, subdivision.plan.max_edge))
-    pieces = np.maximum(PER_EDGE * areas(facets.triangles) / edge**2, 1.0)
-    return float(pieces[is_smooth].sum()), float(pieces[~is_smooth].sum())
 
 
 def _shadows_may_fall(scene: ScenePlan) -> bool:

@@ -15,11 +15,12 @@ from ..numerics.plan import LEAST_TOLERANCE, PROFILES
 from ..numerics.pulse_geometry import PulseGeometry
 from ..scattering.antenna_weight_error import weight_error as error_of_weights
 from ..scattering.antenna_weights import AntennaWeights, WeightError
-from ..scattering.facet_kinds import FacetView
+from ..scattering.facet_kinds import FacetView, coherent
 from ..scattering.facet_plan import MOST_FACETS
 from ..scattering.facet_shadows import rough_looks
 from ..scattering.subdivision import Subdivision, cell_edge, plan_cut
 from ..scene.scene import Scene
+from ..scene.triangles import areas
 from ._unseen_scene import refuse_unseen
 from .echo_request import EchoRequest
 from .spreading import PER_TILE, Band
@@ -30,6 +31,10 @@ NODES = 0.3  # share of a tolerance: largest error of gains interpolated over th
 SHADOWS = 0.8
 EDGES = 0.2  # share of a tolerance for edges: they are weaker than facets, which keep 0.98 of it
 CUT_PROFILES = 1.5  # error of range profiles of cut facets, over the least of 64 of them: sums are longer than that
+
+# Pieces per facet, over area / edge^2: isosceles right triangles that are bisected until their longest side is shorter
+# than the edge have sides of 0.71 to 1 edge
+PER_EDGE = 5.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +72,18 @@ class ScenePlan:
     def n_nodes(self) -> int:
         """Number of frequencies at which the weights of points are computed."""
         return self.weight_error.nodes(NODES * self.error_budget)
+
+    def n_pieces(self) -> tuple[float, float]:
+        """About the numbers of pieces of coherent and of other facets."""
+        subdivision, facets = self.subdivision, self.seen.scene
+        if subdivision is None:
+            return 0.0, 0.0
+        is_smooth = coherent(facets)
+        if not subdivision.cuts:
+            return float(is_smooth.sum()), float((~is_smooth).sum())
+        edge = np.where(is_smooth, subdivision.plan.max_edge, min(subdivision.cell, subdivision.plan.max_edge))
+        pieces = np.maximum(PER_EDGE * areas(facets.triangles) / edge**2, 1.0)
+        return float(pieces[is_smooth].sum()), float(pieces[~is_smooth].sum())
 
     def describe(self) -> dict[str, Any]:
         """Words and numbers for a forecast: those of a report that are known before the scene is prepared."""

@@ -83,9 +83,10 @@ class Pass:
         """Positions of both antennas at mid-aperture, m."""
         return [(end[N // 2 - 1] + end[N // 2]) / 2 for end in (self.tx, self.rx)]
 
-    def axes(self, grid, place):
-        """Unit vectors of range and cross-range on a plane grid, at a place on it, m."""
-        gradient = sum((np.array(place) - end) / np.linalg.norm(np.array(place) - end) for end in self.middle())
+    def axes(self, grid, place, ends=None):
+        """Unit vectors of range and cross-range on a plane grid, at a place on it, m, of antennas at `ends`, m."""
+        ends = self.middle() if ends is None else ends
+        gradient = sum((np.array(place) - end) / np.linalg.norm(np.array(place) - end) for end in ends)
         along = gradient - (gradient @ grid.normal) * grid.normal
         along /= np.linalg.norm(along)
         return along, np.cross(grid.normal, along)
@@ -183,26 +184,46 @@ def test_the_lobes_across_range_are_the_mean_of_every_frequencys_sinc():
     assert 10 * np.log10(p[~main].sum() / p[main].sum()) == pytest.approx(-10.22, abs=0.01)
 
 
-def test_the_interpolator_follows_a_sinc_just_above_its_nyquist_rate():
-    """sinc(0.8 i) sinc(0.78 j) on a carrier of 5 cycles per pixel, interpolated between pixels."""
-    seen = Pass()
-    grid = seen.grid(CENTRE, shape=70)
-    middle = (seen.tx[N // 2 - 1] + seen.tx[N // 2]) / 2
+def sinc_image(seen, grid, middle, index):
+    """Values at positions, m (..., 3), of sinc(0.8 i) sinc(0.78 j) on a carrier of 5 cycles per pixel about a pixel
+    index (row, column); and their image, of an antenna at `middle`."""
 
     def value(x):
         row, column = np.moveaxis(grid.index(x), -1, 0)
         path = np.linalg.norm(x - middle, axis=-1) - np.linalg.norm(middle)
         carrier = np.exp(4j * np.pi * seen.frequency / SPEED_OF_LIGHT * path)
-        return np.sinc(0.8 * (row - 34.6)) * np.sinc(0.78 * (column - 35.1)) * carrier
+        return np.sinc(0.8 * (row - index[0])) * np.sinc(0.78 * (column - index[1])) * carrier
 
-    image = sarcl.Image(value(grid.positions), grid, frequency=seen.frequency, tx=middle)
+    return value, sarcl.Image(value(grid.positions), grid, frequency=seen.frequency, tx=middle)
+
+
+def test_the_interpolator_follows_a_sinc_just_above_its_nyquist_rate():
+    seen = Pass()
+    grid, middle = seen.grid(CENTRE, shape=70), seen.middle()[0]
+    _, image = sinc_image(seen, grid, middle, (34.6, 35.1))
     got = sarcl.measure(image)
-    for cut, axis in zip(got.cuts, seen.axes(grid, got.position), strict=True):
-        assert np.abs(cut.values - value(got.position + cut.distance[:, None] * axis)).max() < 1e-4
     np.testing.assert_allclose(grid.index(got.position), [34.6, 35.1], atol=1e-4)
     np.testing.assert_allclose(got.irw, HALF / np.array([0.78, 0.8]) * grid.spacing[0], rtol=1e-4)
     np.testing.assert_allclose(got.pslr, -13.26, atol=0.005)
     np.testing.assert_allclose(got.islr, -10.22, atol=0.01)
+
+
+def test_cuts_in_all_directions_through_random_places_are_interpolated_to_1e_4():
+    """Cuts run along the range: antennas in 12 directions, and a peak at a random place between the pixels for each."""
+    seen, random, places = Pass(), np.random.default_rng(0), []
+    grid = seen.grid(CENTRE, shape=70)
+    for angle in np.deg2rad(np.arange(5, 365, 30)):
+        turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
+        middle = turn @ seen.middle()[0]
+        value, image = sinc_image(seen, grid, middle, random.uniform(31, 39, 2))
+        got = sarcl.measure(image)
+        for cut, axis in zip(got.cuts, seen.axes(grid, got.position, [middle]), strict=True):
+            at = got.position + cut.distance[:, None] * axis
+            places.append(grid.index(at))
+            assert np.abs(cut.values - value(at)).max() < 1e-4
+    rows, columns = np.concatenate(places).T
+    assert len(rows) >= 2000
+    assert min(np.ptp(rows), np.ptp(columns)) > 25  # pixels
 
 
 @pytest.mark.parametrize("oversample", [1.3, 2, 4, 8])

@@ -26,11 +26,7 @@ from sarcl.blocks import tile_files
 from sarcl.blocks.bands import BandBuffer
 from sarcl.blocks.tile_files import mark
 from sarcl.cli import parser
-from sarcl.imaging._image_job import image_job
-from sarcl.imaging._image_output import ImageOutput
-from sarcl.imaging.choose_method import choose
 from sarcl.imaging.engine import Skipped
-from sarcl.imaging.focusing_task import make_task
 from sarcl.io import output_paths
 
 GRID = sarcl.ImageGrid.plane(center=(1, 2, 0), shape=(700, 301), spacing=(0.03, 0.02))
@@ -172,7 +168,7 @@ def test_a_run_that_was_stopped_goes_on_and_makes_no_tile_twice(raw, whole, tmp_
 
 def planned(raw):
     """How GRID is focused."""
-    return choose(make_task(raw, GRID, None, None, False, True), "auto", 1e-3)
+    return sarcl.backproject.planned(raw, GRID).chosen
 
 
 def bands(raw):
@@ -182,16 +178,14 @@ def bands(raw):
 
 def found(raw, path):
     """Runs of bands in the files beside an image, read and checked."""
-    task, chosen = make_task(raw, GRID, None, None, False, True), planned(raw)
-    job = image_job(task, chosen, 1e-3)
+    job = sarcl.backproject.planned(raw, GRID).job
     files = tile_files.TileStore(tile_files.folder_of(path, job), job)
-    return [run for run, _, _ in files.found(0, chosen.tiling.n_bands)]
+    return [run for run, _, _ in files.found(0, bands(raw))]
 
 
 def test_tile_files_name_why_pairs_were_skipped(raw, tmp_path):
     tiling, skipped = planned(raw).tiling, Skipped(window=2**70, beam=3)
-    job = image_job(make_task(raw, GRID, None, None, False, True), planned(raw), 1e-3)
-    files = tile_files.TileStore(tmp_path / "image.h5.parts", job)
+    files = tile_files.TileStore(tmp_path / "image.h5.parts", sarcl.backproject.planned(raw, GRID).job)
     files.save(0, 1, [np.zeros((tiling.count(0, 1) // 301, 301), np.complex64)], skipped)
     (path,) = tiles(tmp_path)
     assert b'"tally": {"window": 1180591620717411303424, "beam": 3}' in path.read_bytes()
@@ -513,10 +507,11 @@ def test_tiles_of_another_job_are_refused_with_what_differs(raw, tmp_path, name)
 
 def test_every_field_of_a_task_has_its_part_in_the_fingerprint(raw):
     """Also fields that are added later: none may be forgotten."""
-    task, chosen = make_task(raw, GRID, None, None, False, True), planned(raw)
+    plan = sarcl.backproject.planned(raw, GRID)
+    task = plan.task
 
     def mark_of(task):
-        return mark(image_job(task, chosen, 1e-3).describe())
+        return mark(replace(plan, task=task).job.describe())
 
     @dataclass(frozen=True, eq=False)
     class More(type(task)):
@@ -670,6 +665,7 @@ def test_memory_too_small_for_one_row_names_what_would_do():
     assert sarcl.backproject(raw, GRID, max_bytes=enough * 1.05).data.shape == GRID.shape
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize(
     "grid", [sarcl.ImageGrid.plane(shape=(40, 5000), spacing=0.002), LISTED], ids=["wide", "listed"]
 )
@@ -689,19 +685,14 @@ def test_a_band_larger_than_memory_is_made_in_parts(device, grid, tmp_path):
 
 def test_a_strip_takes_what_the_whole_image_would(raw):
     """Each band written into a BandBuffer of its own is what stands there in the image."""
-    from contextlib import ExitStack
-
-    task = make_task(raw, GRID, None, None, False, True)
-    tiling = choose(task, "auto", 1e-3).tiling
-    rng = np.random.default_rng(0)
-    with ExitStack() as stack:
-        target = ImageOutput(GRID, tiling, None, stack)
-        for first, last in ((0, 2), (2, 3), (3, tiling.n_bands)):
-            values = rng.standard_normal(tiling.pixels(first, last)).astype(np.complex64)
-            strip = BandBuffer(tiling, first, last, np.complex64)
-            for flat in (strip, target.flat):
-                tiling.place(values, (first, last), 0, tiling.bands(first, last)[1], flat)
-            assert np.array_equal(strip.values, target.flat[tiling.extent(first, last)])
+    tiling, rng = planned(raw).tiling, np.random.default_rng(0)
+    image = np.zeros(GRID.shape, np.complex64)
+    for first, last in ((0, 2), (2, 3), (3, tiling.n_bands)):
+        values = rng.standard_normal(tiling.pixels(first, last)).astype(np.complex64)
+        strip = BandBuffer(tiling, first, last, np.complex64)
+        for flat in (strip, image):
+            tiling.place(values, (first, last), 0, tiling.bands(first, last)[1], flat)
+        assert np.array_equal(strip.values, image[tiling.extent(first, last)])
 
 
 # ---- command line

@@ -19,10 +19,12 @@ import trimesh
 import sarcl
 from sarcl.cli.parser import main
 from sarcl.figures import decibels
-from sarcl.io import _checksums, hdf5, output_paths, sarcl_hdf5
+from sarcl.io import hdf5, output_paths, sarcl_hdf5
 from sarcl.scenario import scenario
 
 N, M = 300, 700
+# behind the HDF5 file: text, its CRC-32 in 4 bytes, its length in 8, and this; a CRC for each MiB of rows, about
+MAGIC, END, BLOCK_BYTES = b"sarcl checksums 1\n", 30, 2**20
 
 
 def saved(path, n=N, m=M):
@@ -37,11 +39,16 @@ def saved(path, n=N, m=M):
     return raw
 
 
+def checksums_of(path):
+    """Their text, behind an HDF5 file."""
+    data = path.read_bytes()
+    length = int.from_bytes(data[-len(MAGIC) - 8 : -len(MAGIC)], "little")
+    return data[-END - length : -END]
+
+
 def without_checksums(path):
     """As a file of an earlier version."""
-    data = path.read_bytes()
-    length = int.from_bytes(data[-len(_checksums.MAGIC) - 8 : -len(_checksums.MAGIC)], "little")
-    path.write_bytes(data[: -_checksums.END - length])
+    path.write_bytes(path.read_bytes()[: -END - len(checksums_of(path))])
 
 
 def flipped(path, at, bit=0):
@@ -54,7 +61,7 @@ def flipped(path, at, bit=0):
 
 
 def test_damaged_rows_are_named_and_the_others_can_be_read(tmp_path):
-    m = _checksums.BLOCK_BYTES // (8 * 50)  # samples, so that a block has 50 rows
+    m = BLOCK_BYTES // (8 * 50)  # samples, so that a block has 50 rows
     raw = saved(tmp_path / "a.h5", m=m)
     with h5py.File(tmp_path / "a.h5") as file:
         start = file["samples"].id.get_offset()
@@ -73,7 +80,7 @@ def test_damaged_rows_are_named_and_the_others_can_be_read(tmp_path):
 
 
 def test_rows_in_any_order_get_the_checksums_of_what_was_written(tmp_path):
-    m = _checksums.BLOCK_BYTES // (8 * 4)  # columns, so that a block has 4 rows
+    m = BLOCK_BYTES // (8 * 4)  # columns, so that a block has 4 rows
     values = np.random.default_rng(1).normal(size=(2, 30, m)).astype(np.float32)
     values = values[0] + 1j * values[1]
     orders = {
@@ -97,16 +104,20 @@ def test_rows_in_any_order_get_the_checksums_of_what_was_written(tmp_path):
         rows.file.close()
 
 
-def test_rows_written_in_order_are_not_read_again_for_their_checksums():
-    rows = np.arange(_checksums.BLOCK_BYTES // 8 * 5 // 2, dtype=np.complex64).reshape(-1, 8)
-    sums = _checksums.RunningSums(rows.shape, rows.dtype)
-    each = len(rows) // 7
-    for first in range(0, len(rows), each):
-        sums.wrote(slice(first, min(first + each, len(rows))), rows[first : first + each])
-    assert len(sums.sums) == 3
-    found = sums.of(None)  # there is nothing to read
-    sums.wrote(slice(3, 4), rows[3:4])
-    assert sums.of(rows) == found
+def test_rows_written_in_order_are_not_read_again_for_their_checksums(tmp_path, monkeypatch):
+    rows = np.arange(BLOCK_BYTES // 8 * 5 // 2, dtype=np.complex64).reshape(-1, 8)
+    each, reads, read = len(rows) // 7, [], h5py.Dataset.__getitem__
+    monkeypatch.setattr(h5py.Dataset, "__getitem__", lambda dataset, at: reads.append(at) or read(dataset, at))
+    for again in (False, True):
+        with sarcl_hdf5.ImageWriter(tmp_path / "a.h5", {"shape": rows.shape, "center": np.zeros(3)}) as out:
+            for first in range(0, len(rows), each):
+                out.data[first : first + each] = rows[first : first + each]
+            if again:
+                out.data[3:4] = rows[3:4]
+            out.close({"gain": 1.0})
+        blocks = json.loads(checksums_of(tmp_path / "a.h5"))["blocks"]
+        assert len(blocks) == 3 and blocks == [zlib.crc32(rows[a : a + 2**14]) for a in range(0, len(rows), 2**14)]
+        assert len(reads) == again  # the block of row 3 alone
 
 
 @pytest.mark.parametrize("name", ["tx", "frequency", "reference_range"])
@@ -135,14 +146,13 @@ def test_every_byte_outside_the_rows_is_covered(tmp_path):
 
 def test_the_checksums_are_crc_32_of_the_bytes_of_whole_rows(tmp_path):
     raw = saved(tmp_path / "a.h5")
-    found = _checksums.of(tmp_path / "a.h5")
+    found = json.loads(checksums_of(tmp_path / "a.h5"))
     data = raw.samples.tobytes()
-    step = found.step * 8 * M
-    assert (
-        found.blocks == [zlib.crc32(data[a : a + step]) for a in range(0, len(data), step)] and len(found.blocks) == 2
-    )
-    end = (tmp_path / "a.h5").read_bytes()[found.size :]
-    assert json.loads(end[: -_checksums.END])["size"] == found.size and end.endswith(_checksums.MAGIC)
+    step = found["step"] * 8 * M
+    wanted = [zlib.crc32(data[a : a + step]) for a in range(0, len(data), step)]
+    assert found["blocks"] == wanted and len(wanted) == 2
+    end = (tmp_path / "a.h5").read_bytes()[found["size"] :]
+    assert json.loads(end[:-END]) == found and end.endswith(MAGIC)
 
 
 def test_files_without_checksums_are_read_as_before_and_by_h5py_too(tmp_path):

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import json
 import os
 import subprocess
 import sys
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,15 +13,12 @@ import pytest
 import sarcl
 from sarcl.base import float_pairs
 from sarcl.base.threads import threads
-from sarcl.cli.parser import main
 from sarcl.fullwave.fields import Fields
 from sarcl.fullwave.lattice import Lattice
 from sarcl.fullwave.target import Target
-from sarcl.opencl import _trial_record, choose_device, device_list, fft, programs
-from sarcl.opencl._trial import Outcome
+from sarcl.opencl import fft, programs
 from sarcl.opencl.choose_device import open_device
 from sarcl.opencl.device import Device, Limits
-from sarcl.opencl.device_list import DeviceInfo
 
 
 def run_python(code, **environment):
@@ -62,183 +57,6 @@ def test_a_name_that_matches_nothing_lists_what_there_is():
     assert "'abacus'" in str(caught.value)
     for info in sarcl.devices():
         assert info.name in str(caught.value)
-
-
-@pytest.fixture
-def record(tmp_path, monkeypatch):
-    """An empty record of trials in a folder of its own: its path, a list that grows with each trial, a new process."""
-    path, trials, trial = tmp_path / "cache" / "devices.json", [], device_list.trial
-
-    def counted(handle, *offered):
-        trials.append(handle)
-        return trial(handle, *offered)
-
-    def new_process():
-        _trial_record._record.cache_clear()
-        device_list.tried.cache_clear()
-        trials.clear()
-
-    monkeypatch.setattr(_trial_record, "_path", lambda: path)
-    monkeypatch.setattr(device_list, "trial", counted)
-    new_process()
-    yield SimpleNamespace(path=path, trials=trials, new_process=new_process)
-    new_process()
-
-
-def test_a_trial_that_succeeded_is_not_repeated_by_the_next_process(record):
-    first = sarcl.devices()
-    assert record.trials
-    entries = json.loads(record.path.read_text())
-    assert [entry["fp64"] for entry in entries.values() if not entry["why"]] == [d.fp64 for d in first if d.works]
-    assert all(any(d.driver in key and d.name in key for d in first) for key in entries)
-    assert [p.name for p in record.path.parent.iterdir()] == [record.path.name]
-    record.new_process()
-    assert sarcl.devices() == first
-    assert not [info for info, handle in device_list.listed() if first[info.index].works and handle in record.trials]
-
-
-def test_the_command_devices_tries_every_device_again(record, capsys):
-    first = sarcl.devices()
-    record.new_process()
-    assert main(["devices"]) == 0
-    assert set(record.trials) == {handle for _, handle in device_list.listed()}
-    assert first[0].name[:20] in capsys.readouterr().out
-    assert json.loads(record.path.read_text())
-
-
-@pytest.mark.parametrize("contents", [b"", b"{", b"[1]", b'{"a": 1}', b"\xff\x00", b"[" * 60000, b'{"a":' * 20000])
-def test_a_damaged_record_is_taken_for_empty_and_written_again(record, contents):
-    record.path.parent.mkdir()
-    record.path.write_bytes(contents)
-    works = [d for d in sarcl.devices() if d.works]
-    assert works and record.trials
-    assert len(json.loads(record.path.read_text())) == len(works)
-
-
-def test_a_record_of_another_user_or_behind_a_link_is_not_believed(record, tmp_path, monkeypatch):
-    sarcl.devices()
-    entries = record.path.read_text()
-    other = tmp_path / "other.json"
-    record.path.rename(other)
-    record.path.symlink_to(other)
-    record.new_process()
-    sarcl.devices()
-    assert record.trials and not record.path.is_symlink()
-    assert other.read_text() == entries and json.loads(record.path.read_text()).keys() == json.loads(entries).keys()
-    monkeypatch.setattr("os.getuid", lambda: os.stat(record.path).st_uid + 1)
-    record.new_process()
-    sarcl.devices()
-    assert record.trials
-
-
-def test_a_record_that_cannot_be_written_is_no_error(record):
-    record.path.parent.write_text("a file where the folder should be")
-    assert any(d.works for d in sarcl.devices())
-    record.new_process()
-    assert any(d.works for d in sarcl.devices()) and record.trials
-
-
-def test_the_record_lies_in_the_cache_folder_of_the_user_and_nowhere_else(monkeypatch, tmp_path):
-    if sys.platform == "linux":
-        monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-        assert _trial_record._path() == tmp_path / "sarcl" / "devices.json"
-    monkeypatch.setattr("platformdirs.user_cache_dir", lambda *names, **options: "~/.cache/sarcl")
-    with pytest.raises(OSError, match="would lie in the current folder"):
-        _trial_record._path()
-    _trial_record._record.cache_clear()
-    assert _trial_record.find("any") is None
-    _trial_record._record.cache_clear()
-
-
-def two_devices(monkeypatch, works):
-    """A graphics card and a processor, of which those in `works` work; opened, a device is its index."""
-    common = dict(works=False, why="not tried", fp64=False, vector_width=1, memory=1, max_alloc=1, units=4, driver="1",
-                  local_memory=1, max_group=1, warp=1, fast_fp64=False, rate=0.0, pci="")  # fmt: skip
-    platform = SimpleNamespace(version="1")
-    infos = [
-        DeviceInfo(index=i, platform="P", name=f"{k} of P", kind=k, **common) for i, k in enumerate(("gpu", "cpu"))
-    ]
-    listed = tuple((i, SimpleNamespace(platform=platform, double_fp_config=0, kind=i.kind)) for i in infos)
-    for module in (device_list, choose_device):
-        monkeypatch.setattr(module, "listed", lambda: listed)
-    tried = []
-
-    def trial(handle, lanes, fp64, *offered):
-        tried.append(handle.kind)
-        if handle.kind not in works:
-            return Outcome(settled=False, why="broken")
-        return Outcome(fp64=fp64, fast_fp64=fp64)
-
-    monkeypatch.setattr(device_list, "trial", trial)
-    monkeypatch.setattr(choose_device, "open_listed", lambda index: index)
-    return tried
-
-
-def test_only_the_device_that_is_asked_for_is_tried(record, monkeypatch):
-    monkeypatch.delenv("SARCL_DEVICE", raising=False)
-    tried = two_devices(monkeypatch, works=("gpu", "cpu"))
-    assert open_device("cpu") == 1 and tried == ["cpu"]
-    assert open_device() == 0 and tried == ["cpu", "gpu"]
-    assert "0 gpu of P" in record.path.read_text()
-
-
-def test_a_device_that_fails_is_passed_over_not_recorded_and_tried_by_the_next_process(record, monkeypatch):
-    monkeypatch.delenv("SARCL_DEVICE", raising=False)
-    tried = two_devices(monkeypatch, works=("cpu",))
-    for _ in range(2):
-        assert open_device() == 1
-        assert open_device() == 1
-        assert "gpu" not in record.path.read_text()
-        record.new_process()
-    assert tried == ["gpu", "cpu", "gpu"]
-    with pytest.raises(sarcl.NoDeviceError, match=r"'gpu' matches no working OpenCL device. Found: 0: .* broken"):
-        open_device("gpu")
-
-
-def test_a_trial_in_float64_that_failed_once_is_repeated_by_the_next_process(record, monkeypatch):
-    two_devices(monkeypatch, works=("gpu", "cpu"))
-    for _, handle in device_list.listed():
-        handle.double_fp_config = 63  # both offer float64
-    failing, trials = {"gpu"}, []
-
-    def trial(handle, *offered):
-        trials.append(handle.kind)
-        if handle.kind in failing:
-            return Outcome(settled=False, why64="out of memory")
-        return Outcome(fp64=True)
-
-    monkeypatch.setattr(device_list, "trial", trial)
-    assert [(d.works, d.fp64, d.why) for d in sarcl.devices()] == [(True, False, "out of memory"), (True, True, "")]
-    assert "gpu" not in record.path.read_text()
-    failing.clear()
-    record.new_process()
-    trials.clear()
-    assert [(d.works, d.fp64) for d in sarcl.devices()] == [(True, True), (True, True)]
-    assert trials == ["gpu"]  # the cpu's verdict was recorded
-    record.new_process()
-    assert all(d.fp64 for d in sarcl.devices()) and len(trials) == 1
-
-
-def test_a_device_that_computes_wrong_numbers_is_recorded_as_such_and_not_tried_again(record, monkeypatch):
-    tried = two_devices(monkeypatch, works=("cpu",))
-
-    def trial(handle, *offered):
-        tried.append(handle.kind)
-        return Outcome(why="" if handle.kind == "cpu" else "wrong numbers")
-
-    monkeypatch.setattr(device_list, "trial", trial)
-    for _ in range(2):
-        assert [(d.works, d.why) for d in sarcl.devices()] == [(False, "wrong numbers"), (True, "")]
-        record.new_process()
-    assert tried == ["gpu", "cpu"]
-
-
-def test_a_device_that_offers_no_float64_is_not_tried_again(record, monkeypatch):
-    tried = two_devices(monkeypatch, works=("gpu", "cpu"))
-    for _ in range(2):
-        assert not any(d.fp64 for d in sarcl.devices())
-        record.new_process()
-    assert tried == ["gpu", "cpu"]
 
 
 def test_without_any_platform_the_remedy_is_named(tmp_path):

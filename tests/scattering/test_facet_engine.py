@@ -9,13 +9,7 @@ from helpers.facet_cases import WET, plate, seen_from, still
 
 import sarcl
 from sarcl.base.constants import SPEED_OF_LIGHT
-from sarcl.numerics import polynomials
-from sarcl.numerics.pulse_geometry import PulseGeometry
 from sarcl.reference import facet
-from sarcl.scattering import facet_plan
-from sarcl.scattering._frequency_nodes import OverBand
-from sarcl.scattering.facet_kinds import FacetView
-from sarcl.scattering.facets import FacetSet
 from sarcl.scene.material import Material
 from sarcl.scene.triangles import centroids, normals
 
@@ -52,6 +46,7 @@ def test_a_five_metre_plate_tilted_by_20_degrees(distance, elevation, tolerance)
     assert raw.report.predicted_error <= tolerance
 
 
+@pytest.mark.costly
 @pytest.mark.parametrize("material, bistatic", thinned([Material(), WET, Material(eps_r=3.0)], [True, False]))
 def test_every_polarisation_of_tilted_facets(device, material, bistatic):
     random = np.random.default_rng(3)
@@ -194,39 +189,6 @@ def test_the_measured_error_is_that_of_the_engine(every_device):
     track = still(*(seen_from(8e3, 0.8, a) for a in np.linspace(0, 0.05, 20)))
     raw = sarcl.echo(scene, CHIRP, track, polarization="all", shadows=False, check=True, device=every_device)
     assert 0 < raw.report.measured_error <= raw.report.predicted_error <= 1e-3
-
-
-@pytest.mark.parametrize("material", ["metal", "wet soil", ROUGH])
-@pytest.mark.parametrize("edge", [0.03, 0.2, 0.6])
-@pytest.mark.parametrize("bandwidth", [0.06, 0.4])
-def test_the_error_between_frequencies_is_no_more_than_samples_say(material, edge, bandwidth):
-    """Amplitudes of 400 facets at 9 frequencies, interpolated, against what 96 of them promise."""
-    random = np.random.default_rng(9)
-    corners = random.uniform(-30, 30, (400, 1, 3)) + random.uniform(-0.6, 0.6, (400, 3, 3)) * edge
-    scene, fc = sarcl.Scene.facets(corners, material=material), 9.6e9
-    track = still(*(seen_from(8e3, 0.8, a) for a in np.linspace(0, 0.05, 7)))
-    antennas = PulseGeometry(track.positions, track.positions)
-    vertical, band = np.array([0.0, 0, 1]), bandwidth * fc
-    view = FacetView(scene, antennas, fc, band, ["HH", "HV"], vertical)
-    errors = OverBand(view, np.inf, np.zeros(len(scene.triangles), bool)).errors(np.inf)
-    part = FacetSet(
-        scene.triangles, scene.reflectivity, scene.two_sided, scene.material, scene.materials, None, np.arange(400),
-        np.exp(2j * np.pi * random.uniform(size=400)).astype(np.complex64),
-    )  # fmt: skip
-
-    def sent(f):
-        return part.amplitudes(track.positions[3], track.positions[3], np.array([f]), ["HH", "HV"], vertical).ravel()
-
-    f = np.linspace(fc - band / 2, fc + band / 2, 9)
-    exact = np.stack([sent(one) for one in f])
-    for n in (1, 2, 4, 8):
-        nodes = polynomials.chebyshev(fc, band, n)
-        at_nodes = np.stack([sent(one) for one in nodes])
-        for power in (0, 1):
-            plan = facet_plan.FacetPlan(1.0, nodes, 0.0, 1.0, power)
-            over = at_nodes / (nodes[:, None] / 1e9) ** power
-            found = np.linalg.norm(plan.basis(f).T @ over - exact) / np.linalg.norm(exact)
-            assert found <= errors[power][n] + 1e-14, (power, n)
 
 
 def test_facets_left_whole_are_refused_where_they_are_too_large():

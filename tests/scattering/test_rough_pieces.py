@@ -162,7 +162,8 @@ SCENES = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", ["terrain", "two-sided sheets", "a slab on terrain, in shadow", *(
+@pytest.mark.parametrize("name", [
+    "terrain", "two-sided sheets", pytest.param("a slab on terrain, in shadow", marks=pytest.mark.costly), *(
     pytest.param(name, marks=REPEATED) for name in ("random heights", "terrain that hides nothing", "a box on terrain",
                                                     "a smooth box on terrain")
 )])  # fmt: skip

@@ -12,10 +12,7 @@ from helpers.cases import planned_within
 import sarcl
 from sarcl.base.errors import NothingSeen
 from sarcl.base.report import root_sum_square
-from sarcl.simulation import _planned_echoes as planned_echoes
-from sarcl.simulation._planned_echoes import pieces_of
-from sarcl.simulation._single_channel import SingleEchoes
-from sarcl.simulation.spectral import _spectral_plan
+from sarcl.simulation import scene_plan, scene_preparation
 
 CHIRP = sarcl.Waveform.chirp(center=9.6e9, bandwidth=150e6, duration=1e-6)
 TRACK = sarcl.Trajectory.circle(radius=800.0, height=600.0, arc=0.02, n_pulses=48, prf=100.0)
@@ -110,8 +107,9 @@ def test_the_shares_of_shadows_that_are_sampled_bound_their_errors():
 def test_a_run_does_not_plan_again_and_may_be_repeated(call, monkeypatch):
     subjects, options = call
     raw, told = sarcl.echo(*subjects, **options), forecast(PREPARED, *subjects, **options)
-    for name in ("prepare_scene", "planned_scene"):
-        monkeypatch.setattr(planned_echoes, name, lambda *given, **more: pytest.fail("planned again"))
+    monkeypatch.setattr(scene_plan, "share_of", lambda *given, **more: pytest.fail("planned again"))
+    for name in ("points_of", "facets_of"):
+        monkeypatch.setattr(scene_preparation, name, lambda *given, **more: pytest.fail("prepared again"))
     first = told.run()
     assert same(first, raw) and same(told.run(), raw)
     seconds = first.report.seconds
@@ -131,7 +129,7 @@ def test_pieces_are_counted_to_a_factor_of_two(name):
     plan = sarcl.echo.planned(SCENES[name](), CHIRP, TRACK, tolerance=1e-2)
     planned, prepared = plan.plan_scene(plan.task.request).with_scene()
     n = 0 if prepared.subdivision is None else prepared.subdivision.plan.n_facets
-    assert n / 2 <= sum(pieces_of(planned.scene)) <= 2 * n
+    assert n / 2 <= sum(planned.scene.n_pieces()) <= 2 * n
 
 
 def test_a_scene_outside_the_range_window_is_refused():
@@ -148,12 +146,14 @@ def test_a_forecast_of_spectral_echo_is_that_of_its_run(monkeypatch):
         assert told.predicted_error == raw.report.predicted_error and told.error_terms == raw.report.error_terms
         assert told.plan["contributions"] == raw.report.contributions_done
         with monkeypatch.context() as patched:
-            patched.setattr(_spectral_plan, "plan_parts", lambda *given: pytest.fail("planned again"))
+            patched.setattr(scene_plan, "share_of", lambda *given: pytest.fail("planned again"))
             assert same(told.run(), raw) and same(told.run(), raw)
 
 
 def test_a_forecast_times_other_pulses_only_where_nothing_is_seen(monkeypatch):
-    tried, fill = [], SingleEchoes.fill
+    plan = sarcl.echo.planned(points(), CHIRP, TRACK)
+    kind = type(plan.plan_scene(plan.task.request).method)
+    tried, fill = [], kind.fill
 
     def unseen(method, scene, samples, start, done, total):
         tried.append(start)
@@ -161,6 +161,6 @@ def test_a_forecast_times_other_pulses_only_where_nothing_is_seen(monkeypatch):
         return replace(added, counts=replace(added.counts, outside_window=added.counts.pairs))
 
     sarcl.plan(sarcl.echo, points(), CHIRP, TRACK)
-    monkeypatch.setattr(SingleEchoes, "fill", unseen)
+    monkeypatch.setattr(kind, "fill", unseen)
     assert sarcl.plan(sarcl.echo, points(), CHIRP, TRACK).plan["contributions"] == 0
     assert len(set(tried)) == 3

@@ -33,17 +33,22 @@ def track(elevation=0.3, n=16, distance=2e4):
 
 @pytest.fixture
 def sampled(monkeypatch):
-    """The facets of the terrain of which `echo` has shadows sampled, 0 where none is known as such, call by call."""
-    seen, illuminated = [], illumination.illuminated
+    """Tasks of sampled shadows and their shares, call by call of `echo`."""
+    calls, illuminated = [], illumination.illuminated
 
     def spy(task, *rest):
         _, slopes, floor = task.occlusions
-        seen.append(len(floor.occluders))
         assert not (slopes.hidden & floor.hidden).any() and len(slopes.occluders) <= len(floor.occluders)
-        return illuminated(task, *rest)
+        calls.append((task, illuminated(task, *rest)))
+        return calls[-1][1]
 
     monkeypatch.setattr(facet_shadows, "illuminated", spy)
-    return seen
+    return calls
+
+
+def terrain_facets(sampled):
+    """Facets of the terrain of which shadows are sampled, 0 where none is known as such, of each task."""
+    return [len(task.occlusions[2].occluders) for task, _ in sampled]
 
 
 def without(scene):
@@ -71,16 +76,21 @@ def sampled_echo(*subjects, **options):
     return planned_within({"few_looks": 0}, sarcl.echo, *subjects, **options).run()
 
 
+@pytest.mark.filterwarnings("ignore:.*moves posts:sarcl.SarclWarning")
 @pytest.mark.parametrize("name", SCENES)
 def test_heights_change_no_shadow_on_rough_terrain(name, sampled):
     scene = SCENES[name]()
     known, unknown = (sampled_echo(one, WAVE, track(), **OPTIONS) for one in (scene, without(scene)))
-    assert sampled == [2 * 60**2, 0]
+    assert terrain_facets(sampled) == [2 * 60**2, 0]
+    tasks, found = zip(*sampled, strict=True)
+    np.testing.assert_array_equal(tasks[0].triangles, tasks[1].triangles)
+    shares = [np.array([one.fraction_at(pulse) for pulse in range(len(track().positions))]) for one in found]
+    assert np.abs(shares[0] - shares[1]).mean() <= 1e-5  # 1 facet in 1000 differs, by some of its samples
     norm = np.linalg.norm(unknown.samples)
     assert np.linalg.norm(known.samples - unknown.samples) <= 1e-3 * norm
     assert known.report.plan["shadow edges"].startswith("sampled, ")
     shadowed = [r.report.contributions_skipped["shadowed"] for r in (known, unknown)]
-    # 1 facet in 400 at most: of these, one sample of 512 is seen or not
+    # a facet of which one sample of 512 is seen counts as lit; the shares themselves are compared above
     assert shadowed[0] == pytest.approx(shadowed[1], rel=3e-3) and shadowed[0] > 0
     dark = sampled_echo(without(scene), WAVE, track(), **OPTIONS, shadows=False)
     assert np.linalg.norm(dark.samples - unknown.samples) > 0.1 * norm
@@ -111,12 +121,14 @@ def test_large_smooth_terrain_is_clipped_like_a_small_one(sampled):
 
 
 def test_smooth_terrain_is_clipped_whether_its_heights_are_known_or_not(sampled):
-    """Cut into smaller facets."""
-    scene = hills(n=16, height=1.5, material="metal")
-    echoes = [sarcl.echo(s, WAVE, track(), tolerance=1e-2, check=False) for s in (scene, without(scene))]
-    assert sampled == [] and echoes[0].report.contributions_skipped["shadowed"] > 0
-    known, unknown = (raw.samples for raw in echoes)
-    assert np.linalg.norm(known - unknown) < 1e-3 * np.linalg.norm(unknown)
+    """Cut into smaller facets: n = 12 has the same bits. Two facets of n = 16 turn away during the track, and shade one
+    another then: their amplitudes are interpolated between pulses in one echo alone."""
+    for n, bound in ((12, 0.0), (16, 1e-3)):
+        scene = hills(n=n, height=1.5, material="metal")
+        known, unknown = (sarcl.echo(s, WAVE, track(), tolerance=1e-2, check=False) for s in (scene, without(scene)))
+        assert sampled == [] and known.report.contributions_skipped["shadowed"] > 0
+        assert known.report.plan["partly lit facets"] > 30
+        assert np.linalg.norm(known.samples - unknown.samples) <= bound * np.linalg.norm(unknown.samples)
 
 
 def test_scenes_keep_heights_as_long_as_they_are_theirs():
@@ -147,7 +159,7 @@ def test_what_is_no_longer_all_of_a_terrain_is_taken_by_its_facets(sampled):
     sheared = replace(sheared, point_roughness=sheared.point_roughness[..., ::-1]).realized(1)  # moves sideways
     for other in (holed, shifted, sheared):
         sampled_echo(other, WAVE, track(n=4), tolerance=1e-1, check=False)
-    assert sampled == [0] * 3
+    assert terrain_facets(sampled) == [0] * 3
 
 
 def test_an_antenna_under_the_terrain_is_refused():

@@ -127,7 +127,7 @@ class RangeDopplerPlan:
         return finished(image, self.options.out, "use backproject")
 
 
-def _row_weights(track: Track, plan: FocusPlan, u: np.ndarray, r: np.ndarray, wavelength: float) -> np.ndarray:
+def row_weights(track: Track, plan: FocusPlan, u: np.ndarray, r: np.ndarray, wavelength: float) -> np.ndarray:
     """Weights of all rows, complex (n, n_rows), in pixels at zero-Doppler times, s (n,), and slant ranges, m (n,)."""
     speed, _, shift = plan.fit.at(r)
     sines = sine((u + shift)[:, None], r[:, None], track.times, speed[:, None])
@@ -145,7 +145,7 @@ def _measure_error(raw: PhaseHistory, task: RangeDopplerTask, grid: ImageGrid, d
     index, points = grid.sample(CHECKED, seed=0)
     plan, track = task.plan, task.track
     u, r = plan.times[index[0]], plan.ranges[index[1]]
-    terms = PerPoint(_row_weights(track, plan, u, r, task.wavelength))
+    terms = PerPoint(row_weights(track, plan, u, r, task.wavelength))
     if plan.fit is not task.known:
         t = track.times[:, None]
         terms = terms._replace(longer=(plan.fit.range(u, r, t) - task.known.range(u, r, t)).T)

@@ -7,14 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from ...figures import html
-from ...imaging.backproject import backproject
-from ...model.image_grid import ImageGrid
-from ...model.phase_history import PhaseHistory
 from ...opencl.device import DeviceChoice
 from ...scene.scene import Scene
 from ..paper import Section
 from ._lab import Lab, decibels
-from .range_zones import RangeZones, collect, isolation, of_zone
+from .range_zones import RangeZones, amplitudes, collect, isolation, leak
 
 ZONES = 4
 BEYOND = (-45.0, -15.0, 15.0, 45.0)  # m, distance of each zone's point behind the centre of the zone
@@ -50,7 +47,7 @@ def cuts_of(radar: RangeZones, at: np.ndarray, device: DeviceChoice | None = Non
     record = collect(radar, [Scene.points([radar.place(q, b)]) for q, b in enumerate(BEYOND)], device)
     weights = np.hamming(record.n_samples)
     record = replace(record, samples=(record.samples * (weights / weights.mean())).astype(np.complex64))
-    return [_image(radar, record, q, at, device=device) for q in range(ZONES)]
+    return [amplitudes(radar, record, q, at, device=device) for q in range(ZONES)]
 
 
 def matrix(radar: RangeZones, device: DeviceChoice | None = None) -> np.ndarray:
@@ -60,16 +57,8 @@ def matrix(radar: RangeZones, device: DeviceChoice | None = None) -> np.ndarray:
         empty: list[Scene | None] = [None] * p
         record = collect(radar, [*empty, Scene.points([radar.place(p, beyond)])], device)
         places = beyond + np.linspace(-5, 5, 41)
-        out[p] = [_image(radar, record, q, places, device=device).max() for q in range(ZONES)]
+        out[p] = [amplitudes(radar, record, q, places, device=device).max() for q in range(ZONES)]
     return np.asarray(20 * np.log10(np.maximum(out / np.diag(out)[:, None], 1e-9)))
-
-
-def leak(radar: RangeZones, apart: int, elevation: float = 0.0, device: DeviceChoice | None = None) -> float:
-    """Level in zone 0's image of a point `apart` zones farther, `elevation` rad above, dB relative to its own image."""
-    scenes: list[Scene | None] = [None] * apart
-    record = collect(radar, [*scenes, Scene.points([radar.place(apart, 0.0, elevation)])], device)
-    levels = [float(_image(radar, record, q, np.zeros(1), up, device)[0]) for q, up in ((0, 0.0), (apart, elevation))]
-    return 20 * float(np.log10(max(levels[0] / levels[1], 1e-9)))
 
 
 def _sweeps(out: Section, radar: RangeZones, lab: Lab) -> None:
@@ -94,17 +83,3 @@ def _sweeps(out: Section, radar: RangeZones, lab: Lab) -> None:
         out.keep(**{name: {"at": x, "measured_db": measured, "predicted_db": same, "largest_error_db": error}})
         curves = [("predicted", xs, np.maximum(predicted, FLOOR)), ("measured", x, np.maximum(measured, FLOOR))]
         out.plot("Isolation of the next zone", curves, dots=("measured",), axis=axis, name=name, error=error)
-
-
-def _image(
-    radar: RangeZones,
-    record: PhaseHistory,
-    zone: int,
-    at: np.ndarray,
-    elevation: float = 0.0,
-    device: DeviceChoice | None = None,
-) -> np.ndarray:
-    """Amplitudes of a zone's image, `at` m behind its centre (n,)."""
-    grid = ImageGrid.points(np.stack([radar.place(zone, b, elevation) for b in at]))
-    image = backproject(of_zone(radar, record, zone), grid, tolerance=1e-5, check=False, device=device)
-    return np.abs(image.normalized())

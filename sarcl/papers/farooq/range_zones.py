@@ -24,7 +24,9 @@ import numpy as np
 from ...arrays.array_factor import dirichlet
 from ...base import validation
 from ...base.constants import SPEED_OF_LIGHT
+from ...imaging.backproject import backproject
 from ...model.antenna_array import AntennaArray
+from ...model.image_grid import ImageGrid
 from ...model.phase_history import PhaseHistory
 from ...model.trajectory import Trajectory
 from ...model.waveform import Waveform
@@ -122,6 +124,30 @@ def isolation(radar: RangeZones, apart: int, elevation: float = 0.0) -> float:
     cycles -= radar.center * radar.spacing * np.sin(validation.number("elevation", elevation)) / SPEED_OF_LIGHT
     ratio = abs(float(dirichlet(2 * np.pi * cycles, radar.n))) / radar.n
     return 20 * float(np.log10(ratio)) if ratio > 1e-12 else -np.inf
+
+
+def amplitudes(
+    radar: RangeZones,
+    record: PhaseHistory,
+    zone: int,
+    at: np.ndarray,
+    elevation: float = 0.0,
+    device: DeviceChoice | None = None,
+) -> np.ndarray:
+    """Amplitudes of a zone's image, `at` m behind its centre (n,)."""
+    grid = ImageGrid.points(np.stack([radar.place(zone, b, elevation) for b in at]))
+    image = backproject(of_zone(radar, record, zone), grid, tolerance=1e-5, check=False, device=device)
+    return np.abs(image.normalized())
+
+
+def leak(radar: RangeZones, apart: int, elevation: float = 0.0, device: DeviceChoice | None = None) -> float:
+    """Measured level in zone 0's image of a point `apart` zones farther, `elevation` rad above, dB over its own."""
+    scenes: list[Scene | None] = [None] * apart
+    record = collect(radar, [*scenes, Scene.points([radar.place(apart, 0.0, elevation)])], device)
+    levels = [
+        float(amplitudes(radar, record, q, np.zeros(1), up, device)[0]) for q, up in ((0, 0.0), (apart, elevation))
+    ]
+    return 20 * float(np.log10(max(levels[0] / levels[1], 1e-9)))
 
 
 def _echo(radar: RangeZones, zone: int, scene: Scene, device: DeviceChoice | None) -> PhaseHistory:

@@ -10,8 +10,6 @@ from imaging.test_range_doppler import SPEED, noise, points, seen_from_orbit
 
 import sarcl
 from sarcl.base.constants import SPEED_OF_LIGHT
-from sarcl.imaging.range_doppler import _map_drift
-from sarcl.reference import map_drift as twin
 
 WAVE = SPEED_OF_LIGHT / 9.6e9
 STRIP = {"azimuth_beam": 0.015, "ranges": (3985, 4015)}
@@ -29,38 +27,6 @@ def rates(image):
     """Doppler rate used and that of the geometry, Hz/s."""
     plan = image.report.plan
     return [float(plan[name].split()[0]) for name in ("Doppler rate", "Doppler rate of the geometry") if name in plan]
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_the_correlation_is_that_of_the_twin(seed):
-    random = np.random.default_rng(seed)
-    first, second = random.uniform(0, 1, (2, 31 + seed, 5))
-    spectrum = _map_drift.cross_spectrum(first, second)
-    for lag in (0.0, 3.0, -2.4, 7.125):
-        assert _map_drift.correlation(spectrum, lag) == pytest.approx(twin.correlation(first, second, lag), abs=1e-10)
-
-
-@pytest.mark.parametrize("doppler", [(-60.0, 60.0), (1200.0, 1500.0), (-2500.0, -2000.0)])
-def test_looks_are_displaced_as_the_twin_says(doppler):
-    ranges, speeds = np.array([3e3, 4e3]), np.array([101.0, 100.0])
-    looks = _map_drift.Looks(np.zeros((1, 2)), np.zeros((1, 2)), ranges, speeds, 1e-3, doppler, WAVE)
-    found = _map_drift.displacement(looks, ranges, speeds, 1.02)
-    for got, r, v in zip(found, ranges, speeds, strict=True):
-        assert got == pytest.approx(twin.displacement(v, v * np.sqrt(1.02), r, WAVE, doppler), rel=1e-3)
-
-
-def test_a_moved_look_gives_the_factor_that_moves_it():
-    """Bumps displaced by the closed form of small angles, (q2 - q1) lambda r/2 (1/v0^2 - 1/v^2)."""
-    n, row, ranges = 400, 1e-2, np.linspace(3e3, 5e3, 40)
-    speeds, doppler, factor = np.full(40, 100.0), (-150.0, 150.0), 1.03
-    late = (doppler[1] - doppler[0]) * WAVE * ranges / 2 * (1 - 1 / factor) / 100.0**2 / row  # rows
-    places = np.random.default_rng(1).uniform(60, 340, (3, 40))
-
-    def look(moved):
-        return np.exp(-((np.arange(n)[:, None, None] - places - moved) ** 2) / 18).sum(axis=1)
-
-    looks = _map_drift.Looks(look(0.0), look(late), ranges, speeds, row, doppler, WAVE)
-    assert _map_drift.factor_of(looks) == pytest.approx(factor, abs=2e-4)
 
 
 @pytest.mark.parametrize("faster", [1.0, 1.01, 0.97])

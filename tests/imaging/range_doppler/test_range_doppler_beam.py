@@ -11,9 +11,7 @@ from helpers.cases import noise_on
 
 import sarcl
 from sarcl.base.constants import SPEED_OF_LIGHT
-from sarcl.imaging.range_doppler._aperture_window import ApertureWindow
-from sarcl.imaging.range_doppler.range_doppler import _row_weights, gain_of
-from sarcl.numerics import windows
+from sarcl.imaging.range_doppler.range_doppler import gain_of, row_weights
 
 TAYLOR = ("taylor", 35, 5)
 SPEED = 75.0  # of strip_map, m/s
@@ -123,7 +121,7 @@ def test_the_gain_is_the_sum_of_the_weights_of_the_rows(raw, window):
     image = sarcl.range_doppler(raw, window=window, weights=weights, check=False, **BEAM)
     task = sarcl.range_doppler.planned(raw, window=window, weights=weights, **BEAM).task
     index, _ = image.grid.sample(200, seed=2)
-    share = _row_weights(task.track, task.plan, task.plan.times[index[0]], image.grid.ranges[index[1]],
+    share = row_weights(task.track, task.plan, task.plan.times[index[0]], image.grid.ranges[index[1]],
                          task.wavelength).real  # fmt: skip
     wanted = task.sample_weight.sum() * share @ task.row_weight
     seen = image.gain[index] > 0
@@ -154,46 +152,3 @@ def test_points_at_the_end_of_a_strip_are_as_bright_as_in_its_middle():
     made = image(positions[rows, column])
     assert made.gain[rows[0], column] < 0.8 * made.gain[rows[1], column]
     assert np.abs(made.normalized()[rows, column]) == pytest.approx(1, abs=5e-3)
-
-
-@pytest.mark.parametrize("zones", [8, 30])
-def test_the_error_of_weights_is_that_of_the_smooth_ends_of_a_beam(zones):
-    # measured with white noise for ends of k Fresnel zones: 0.45/(k^3 sqrt n), docs/theory/range_doppler.md
-    box = np.ones(windows.TABLE)
-    half = zones * ZONE / 2
-    # an eighth of the width within the beam, whatever share of the rows is left beyond it
-    made = ApertureWindow.over(-half, half, box, ZONE, 3e-3, inwards=(1 / 8,))
-    width = np.ptp(made.ends) / ZONE - zones
-    k = width / (1 - 2 / 8)  # the window begins an eighth of a width within the beam
-    assert made.error == pytest.approx(0.5 / (k**3 * np.sqrt(zones)), rel=0.35) and made.error <= 3e-3
-
-
-@pytest.mark.parametrize("zones", [4, 8, 30])
-def test_hardly_any_weight_is_left_to_rows_beyond_the_beam(zones):
-    half = zones * ZONE / 2
-    for window in ("boxcar", "hamming", "hann", TAYLOR):
-        made = ApertureWindow.over(-half, half, windows.table(window), ZONE, 3e-2)
-        rows = made.weights / (1 - made.sines**2) ** 1.5  # even in the tangent of the squint angle
-        assert rows[np.abs(made.sines) > half].sum() <= 4e-3 * rows.sum()
-
-
-@pytest.mark.parametrize("window", ["hamming", TAYLOR, "hann", "triang"])
-def test_smoothing_keeps_the_window_and_its_sum(window):
-    table, half = windows.table(window), 40 * ZONE / 2
-    made = ApertureWindow.over(-half, half, table, ZONE, 2.5e-3)
-    step = made.sines[1] - made.sines[0]
-    u = np.clip((made.sines + half) / (2 * half), 0, 1)
-    wanted = np.interp(u, (np.arange(len(table)) + 0.5) / len(table), table)
-    middle = np.abs(made.sines) < 0.8 * half
-    assert np.abs(made.weights - wanted)[middle].max() < 0.03
-    assert made.weights.sum() * step / (2 * half) == pytest.approx(table.mean(), rel=0.02)
-    assert made.weight(np.array([-2 * half, 2 * half])) == pytest.approx([0, 0], abs=0)
-
-
-def test_a_window_beside_the_direction_of_flight_counts_no_rows_beyond_it():
-    """The window's smooth end reaches sines above 1, under which no row sees anything: the share of rows was NaN."""
-    made = ApertureWindow.over(0.9, 1.0, windows.table("hamming"), 0.002, 3e-2)
-    assert made.sines[-1] > 1
-    rows = made.weights[made.sines < 1] / (1 - made.sines[made.sines < 1] ** 2) ** 1.5
-    beyond = made.sines[made.sines < 1] < 0.9
-    assert made.outside(0.9, 1.0) == pytest.approx(rows[beyond].sum() / rows.sum(), rel=1e-12)

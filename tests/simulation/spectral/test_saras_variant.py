@@ -9,8 +9,6 @@ from helpers.devices import opened, variants
 import sarcl
 from sarcl import pointing
 from sarcl.reference import spectral_echo as twin
-from sarcl.simulation.spectral._aspect_window import KnownPhase
-from sarcl.simulation.spectral._stationary_phase import chirp_ripple
 
 
 @pytest.fixture(scope="module")
@@ -45,14 +43,6 @@ def test_its_error_is_predicted_and_refused_where_it_is_too_large(device):
     with pytest.raises(sarcl.ToleranceUnreachable, match=r"variant='saras'.*variant='exact', or echo") as refused:
         sarcl.spectral_echo(points(), CHIRP, TRACK, variant="saras", antenna=narrow, tolerance=3e-2, device=device)
     assert refused.value.best > 3e-2
-
-
-def test_the_printed_sign_of_the_azimuth_terms_is_wrong():
-    # (27) prints -xi^2/4a^2; at xi = u X the phase of the transform is +u^2 r/4 k, as it is of sqrt(4 k^2 - u^2)
-    k, u = np.array([200.0]), np.array([2.0])
-    exact, paraxial = KnownPhase(8e3), KnownPhase(8e3, 200.0)
-    assert paraxial.at_middle(u, k) == pytest.approx(exact.at_middle(u, k), rel=1e-4) and exact.at_middle(u, k) > 0
-    assert paraxial.kappa(u, k) == pytest.approx(exact.kappa(u, k), rel=1e-9)
 
 
 @pytest.mark.parametrize("chi", [0.0, -0.35])
@@ -105,20 +95,19 @@ def test_the_doppler_centroid_is_that_of_the_antennas_pointing(squint, device):
 def test_ripples_are_those_of_a_rectangular_chirp(device, down):
     bandwidth, duration = 50e6, 2e-6
     chirp = sarcl.Waveform.chirp(center=9.6e9, bandwidth=bandwidth, duration=duration, down=down)
-    f = np.linspace(-0.5, 0.5, 9) * bandwidth
-    t = (np.arange(200_000) + 0.5) / 200_000 * duration - duration / 2
     assert chirp.sweep_rate == (-1 if down else 1) * bandwidth / duration
-    wanted = np.array([np.exp(1j * np.pi * (chirp.sweep_rate * t**2 - 2 * x * t)).mean() * duration for x in f])
-    turn = np.exp(-0.25j * np.pi if down else 0.25j * np.pi)
-    stationary = turn / np.sqrt(bandwidth / duration) * chirp.pulse_spectrum(chirp.center + f)
-    assert np.allclose(chirp_ripple(chirp, chirp.center + f) * stationary, wanted, rtol=1e-6, atol=1e-9 * duration)
     options = {"tolerance": 1e-2, "compressed": False, "device": device}
     antenna = sarcl.Antenna.gaussian(width=(0.008, 0.1))
     plain = sarcl.spectral_echo(points(), chirp, TRACK, antenna=antenna, **options)
     rippled = sarcl.spectral_echo(points(), chirp, TRACK, antenna=antenna, ripple=True, **options)
-    ratio = chirp_ripple(chirp, plain.frequency[0] + plain.frequency_step[0] * np.arange(plain.n_samples))
+    f = (plain.frequency[0] + plain.frequency_step[0] * np.arange(plain.n_samples))[::8]
+    t = (np.arange(40_000) + 0.5) / 40_000 * duration - duration / 2
+    pulse = np.exp(1j * np.pi * chirp.sweep_rate * t**2)
+    spectrum = np.array([(pulse * np.exp(-2j * np.pi * (x - 9.6e9) * t)).mean() * duration for x in f])
+    turn = np.exp(-0.25j * np.pi if down else 0.25j * np.pi)
+    ratio = spectrum / (turn / np.sqrt(bandwidth / duration) * chirp.pulse_spectrum(f))
     assert np.abs(ratio.imag).max() > 0.1
-    assert np.allclose(rippled.samples, plain.samples * ratio, rtol=1e-4)
+    assert np.allclose(rippled.samples[:, ::8], plain.samples[:, ::8] * ratio, rtol=1e-4)
 
 
 def test_ripples_of_other_pulses_are_refused(device):

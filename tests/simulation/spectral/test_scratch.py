@@ -1,4 +1,4 @@
-"""Arrays in temporary files hold what is written to them; large echoes keep to the memory that they are given."""
+"""Large echoes keep to the memory that they are given."""
 
 from __future__ import annotations
 
@@ -9,26 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from sarcl.simulation.spectral._scratch import Scratch
-
-
-@pytest.mark.parametrize("room", [0, 1e9])
-def test_a_scratch_holds_what_is_written(room, tmp_path):
-    random = np.random.default_rng(0)
-    wanted = random.normal(size=(37, 11)) + 1j * random.normal(size=(37, 11))
-    held = Scratch((37, 11), room, tmp_path)
-    assert (held.whole is None) == (room == 0)
-    assert not held.rows(0, 37).any()
-    held.put(20, wanted[20:].astype(np.complex64))
-    held.put(0, wanted[:20])
-    rows = held.rows(5, 30)
-    assert np.array_equal(rows, wanted[5:30].astype(np.complex64))
-    rows *= 2
-    held.put(5, rows)
-    assert np.allclose(held.columns(3, 7, 200)[5:30], 2 * wanted[5:30, 3:7], rtol=1e-6)
-    assert np.allclose(held.columns(0, 11, 1e9)[30:], wanted[30:], rtol=1e-6)
-    assert not list(tmp_path.iterdir())  # the file has no name
 
 
 @pytest.mark.slow

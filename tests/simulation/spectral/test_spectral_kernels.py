@@ -1,17 +1,31 @@
-"""The kernels of spectral echoes against their twins, and the map's spectrum against the sum that it computes."""
+"""The kernels of spectral echoes against their twins, facets' amplitudes, maps, and where these lie."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from helpers.cases import thinned
 from helpers.devices import as_gpu
 
+import sarcl
+from sarcl import pointing
 from sarcl.numerics import shared_tile
+from sarcl.numerics.pulse_geometry import PulseGeometry
 from sarcl.reference import spectral_echo as twin
+from sarcl.scattering.antenna_weights import weights_of
+from sarcl.scattering.facet_shadows import ShadowRule
+from sarcl.scattering.physical_optics import normals_and_areas
+from sarcl.scattering.random_surface import pieces_of
+from sarcl.scattering.scatterers import facets_of
+from sarcl.scattering.subdivision import CutScene
+from sarcl.simulation.spectral import _facet_factors as factors
 from sarcl.simulation.spectral._aspect_window import DopplerGrid, aspects, wavenumber
 from sarcl.simulation.spectral._azimuth_transfer import transfer_tables
 from sarcl.simulation.spectral._map_plan import CELLS, plan_map, range_wavenumbers
 from sarcl.simulation.spectral._map_spectrum import ReflectivityMap
+from sarcl.simulation.spectral._scatterer_amplitudes import ScattererAmplitudes
+from sarcl.simulation.spectral._scratch import Scratch
+from sarcl.simulation.spectral._straight_track import straight_track
 
 RANGES, BAND = (2000.0, 2040.0), (3.0e9, 3.1e9)
 
@@ -97,3 +111,72 @@ def test_kernels_are_their_twins(task):
         for part, coordinates in held.coordinates(transfer, f, whole, 1e9)
     ])  # fmt: skip
     assert np.linalg.norm(out - wanted) <= 2e-6 * np.linalg.norm(wanted)
+
+
+CHIRP = sarcl.Waveform.chirp(center=9.6e9, bandwidth=150e6, duration=2e-6)
+MATERIALS = {
+    "metal": "metal",
+    "dispersive": sarcl.Material(eps_r=4.0, conductivity=0.5),
+    "rough": sarcl.Material(eps_r=4.0, conductivity=1e-3, diagram="cos2"),
+    "slightly rough": sarcl.Material(eps_r=9.0, conductivity=1e-3, height=2e-3, diagram="exp", width=0.5),
+}
+ANTENNAS = {
+    "none": (None, None),
+    "gaussian": (sarcl.Antenna.gaussian(width=(0.02, 0.1)), sarcl.Radar(power=1e3)),
+    "two": (
+        (sarcl.Antenna.rectangular(size=(0.5, 0.1)), sarcl.Antenna.table(
+            np.linspace(-0.1, 0.1, 9), np.linspace(-0.2, 0.2, 7), np.outer(np.hanning(11)[1:-1], np.ones(7)))),
+        None,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("material, antenna", thinned(MATERIALS, ANTENNAS))
+def test_factors_of_facets_are_their_amplitudes(material, antenna, every_device):
+    line = sarcl.Trajectory.line(start=(0, -60, 6e3), velocity=(0, 100, 0), prf=250, n_pulses=40)
+    track = pointing.stripmap(line, look=float(np.arctan2(8e3, 6e3)), side="right")
+    axis = np.linspace(-6, 6, 9)
+    heights = np.random.default_rng(1).normal(size=(9, 9)) * 0.3
+    scene = sarcl.Scene.from_heights(8e3 + axis, axis, heights, material=MATERIALS[material])
+    scene = scene + sarcl.shapes.box((2, 2, 3), material="metal").on(scene, 8e3, 0)
+    antennas = PulseGeometry(track.positions, track.positions)
+    (facets,), _ = facets_of(
+        CutScene(scene, None, pieces_of(scene, np.inf, np.inf, 0)), antennas,
+        shadows=ShadowRule(False, True, 1e-2, max_bytes=1e9), skips={"facing away"},
+        device=every_device, progress=lambda *_: None,
+    )  # fmt: skip
+    weights = weights_of(*ANTENNAS[antenna], track, None, CHIRP, scene.center)
+    polarizations = ("HH", "HV", "VH", "VV")
+    amplitudes = ScattererAmplitudes(
+        facets, weights, straight_track(track, 1e10, 1e-3), polarizations, np.array([0.0, 0.0, 1.0])
+    )
+    some = np.flatnonzero(np.random.default_rng(2).random(len(facets)) < 0.8)
+    for budget in (1e9, 1.0):
+        held = factors.FacetFactors(every_device, amplitudes, some, budget, at_once=100)
+        for sine, frequency in ((-0.004, 9.55e9), (0.003, 9.67e9)):
+            wanted = amplitudes(some, sine, frequency)
+            found = held(sine, frequency)
+            assert found.dtype == np.complex64 and found.shape == wanted.shape
+            areas = normals_and_areas(facets.triangles[some])[1]
+            peak = np.sqrt(np.pi) * frequency / 3e8 * areas * 2.1 * weights.peak
+            assert (np.abs(found - wanted).max(axis=1) <= 1e-5 * peak).all()
+            # facets of 50 wavelengths, most of them far from their specular directions
+            assert np.linalg.norm(found - wanted) <= 6e-5 * np.linalg.norm(wanted)
+
+
+@pytest.mark.parametrize("room", [0, 1e9])
+def test_a_scratch_holds_what_is_written(room, tmp_path):
+    random = np.random.default_rng(0)
+    wanted = random.normal(size=(37, 11)) + 1j * random.normal(size=(37, 11))
+    held = Scratch((37, 11), room, tmp_path)
+    assert (held.whole is None) == (room == 0)
+    assert not held.rows(0, 37).any()
+    held.put(20, wanted[20:].astype(np.complex64))
+    held.put(0, wanted[:20])
+    rows = held.rows(5, 30)
+    assert np.array_equal(rows, wanted[5:30].astype(np.complex64))
+    rows *= 2
+    held.put(5, rows)
+    assert np.allclose(held.columns(3, 7, 200)[5:30], 2 * wanted[5:30, 3:7], rtol=1e-6)
+    assert np.allclose(held.columns(0, 11, 1e9)[30:], wanted[30:], rtol=1e-6)
+    assert not list(tmp_path.iterdir())  # the file has no name
