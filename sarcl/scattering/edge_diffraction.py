@@ -76,13 +76,12 @@ def edge_matrix(
     to_tx, to_rx  unit vectors (..., 3) from the edge to the antennas. A transmitter inside of the wedge: 0.
     optics        those of physical optics instead
     """
-    received = polarisation(-to_rx, up)
+    sent = polarisation(-to_tx, up)
+    received = sent if to_rx is to_tx else polarisation(-to_rx, up)
     out = np.empty((*np.broadcast_shapes(wedge.number.shape, to_tx.shape[:-1], to_rx.shape[:-1]), 2, 2), complex)
-    for j, field in enumerate(polarisation(-to_tx, up)):
-        if optics:
-            current = strip_current(wedge, to_tx, to_rx, field, optics=True)
-        else:
-            current = fringe_current(wedge, to_tx, to_rx, field)
+    response = _StripResponse.of(wedge, to_tx, to_rx, (0, 1) if optics else (1, -1))
+    for j, field in enumerate(sent):
+        current = response.current(to_tx, field)
         for i, r in enumerate(received):
             out[..., i, j] = _dot(r, current) / (2 * np.sqrt(np.pi))
     return (out + out.swapaxes(-1, -2)) / 2 if to_rx is to_tx else out  # one antenna
@@ -90,56 +89,88 @@ def edge_matrix(
 
 def fringe_current(wedge: WedgeShape, to_tx: np.ndarray, to_rx: np.ndarray, field: np.ndarray) -> np.ndarray:
     """k K of both faces, complex128 (..., 3), for an incident electric field (..., 3) of unit amplitude."""
-    return strip_current(wedge, to_tx, to_rx, field) - strip_current(wedge, to_tx, to_rx, field, optics=True)
+    return _StripResponse.of(wedge, to_tx, to_rx, (1, -1)).current(to_tx, field)
 
 
 def strip_current(
     wedge: WedgeShape, to_tx: np.ndarray, to_rx: np.ndarray, field: np.ndarray, *, optics: bool = False
 ) -> np.ndarray:
     """k K of the currents on both faces, complex128 (..., 3), all of them or those of physical optics."""
-    t, n, number = wedge.tangent, wedge.normal, wedge.number
-    angle = np.arctan2(_dot(n, to_tx), _dot(wedge.inward, to_tx)) % (2 * np.pi)
-    outside = np.pi * number
-    other = np.cos(outside)[..., None] * wedge.inward + np.sin(outside)[..., None] * n  # x_2
-    one, two = (
-        _face(frame, np.clip(phi, 0, outside), number, (to_tx, to_rx), field, optics)
-        for frame, phi in (((wedge.inward, t), angle), ((other, -t), outside - angle))
-    )
-    return np.asarray(np.where((angle <= outside)[..., None], one + two, 0))
+    return _StripResponse.of(wedge, to_tx, to_rx, (0, 1) if optics else (1, 0)).current(to_tx, field)
 
 
-def _face(
-    frame: tuple[np.ndarray, np.ndarray],
-    phi: np.ndarray,
-    number: np.ndarray,
-    looks: tuple[np.ndarray, np.ndarray],
-    field: np.ndarray,
-    optics: bool,
-) -> np.ndarray:
-    """k K of one face with axes x and t, complex128 (..., 3)."""
-    x, t = frame
-    cosine = -_dot(looks[0], t)
-    sine = np.maximum(np.sqrt(np.maximum(1 - cosine**2, 0)), LEAST_SINE)
-    mu = (_dot(looks[1], x) + cosine / sine * (_dot(looks[1], t) - cosine)) / sine
-    magnetic = cross(-looks[0], field)
-    h_t, e_t = _dot(magnetic, t), _dot(field, t)
+@dataclass(frozen=True, eq=False)
+class _StripResponse:
+    """Currents of both faces for any incident field: for each face its axes x and t (..., 3), and what multiplies H_t
+    in K_x, and H_t, E_t and H_x in K_t (...)."""
+
+    faces: tuple[tuple[np.ndarray, np.ndarray, tuple[np.ndarray, ...]], ...]
+
+    @classmethod
+    def of(cls, wedge: WedgeShape, to_tx: np.ndarray, to_rx: np.ndarray, shares: tuple[int, int]) -> _StripResponse:
+        """shares  of all currents, and of those of physical optics, in the sum"""
+        t, n, number = wedge.tangent, wedge.normal, wedge.number
+        outside = np.pi * number
+        other = np.cos(outside)[..., None] * wedge.inward + np.sin(outside)[..., None] * n  # x_2
+        angle = np.arctan2(_dot(n, to_tx), _dot(wedge.inward, to_tx)) % (2 * np.pi)
+        is_outside = angle <= outside
+        faces = []
+        for x, along, phi in ((wedge.inward, t, angle), (other, -t, outside - angle)):
+            cosine = -_dot(to_tx, along)
+            sine = np.maximum(np.sqrt(np.maximum(1 - cosine**2, 0)), LEAST_SINE)
+            mu = (_dot(to_rx, x) + cosine / sine * (_dot(to_rx, along) - cosine)) / sine
+            phi, mu, cosine, sine, number = np.broadcast_arrays(np.clip(phi, 0, outside), mu, cosine, sine, number)
+            factors = _factors(phi, mu, cosine, sine, number, shares)
+            faces.append((x, along, tuple(np.where(is_outside, one, 0) for one in factors)))
+        return cls(tuple(faces))
+
+    def current(self, to_tx: np.ndarray, field: np.ndarray) -> np.ndarray:
+        """k K, complex128 (..., 3), for an incident electric field (..., 3)."""
+        magnetic, out = cross(-to_tx, field), np.zeros((), complex)
+        for x, t, (x_h, t_h, t_e, t_m) in self.faces:
+            h_t = _dot(magnetic, t)
+            along = t_h * h_t + t_e * _dot(field, t) + t_m * _dot(magnetic, x)
+            out = out + (x_h * h_t)[..., None] * x + along[..., None] * t
+        return np.asarray(out)
+
+
+def _factors(
+    phi: np.ndarray, mu: np.ndarray, cosine: np.ndarray, sine: np.ndarray, number: np.ndarray, shares: tuple[int, int]
+) -> tuple[np.ndarray, ...]:
+    """What multiplies H_t in K_x, and H_t, E_t and H_x in K_t, complex128 (...), of one face."""
     alpha = np.arccos(-mu - 0j)  # from below the cut: a wave along the strip decays
     near = np.abs(alpha - phi) < NUDGE
-    sides = [np.where(near, phi + step, alpha) for step in (NUDGE, -NUDGE)] if near.any() else [alpha]
-    across = along = np.zeros((), complex)
-    for pole in sides:
-        wave = np.where(near, -np.cos(pole), mu)
-        if optics:
-            lit = np.where(phi < np.pi, 2j / (sine * (np.cos(phi) + wave)), 0)
-            across, along = across + h_t * lit, along - _dot(magnetic, x) * lit
-            continue
+    pole = np.where(near, phi + NUDGE, alpha)
+    out = _factors_at(pole, phi, np.where(near, -np.cos(pole), mu), cosine, sine, number, shares)
+    if near.any():
+        p, c, s, n = (a[near] for a in (phi, cosine, sine, number))
+        pole = p - NUDGE + 0j
+        for every, other in zip(out, _factors_at(pole, p, -np.cos(pole), c, s, n, shares), strict=True):
+            every[near] = (every[near] + other) / 2
+    return out
+
+
+def _factors_at(
+    pole: np.ndarray,
+    phi: np.ndarray,
+    mu: np.ndarray,
+    cosine: np.ndarray,
+    sine: np.ndarray,
+    number: np.ndarray,
+    shares: tuple[int, int],
+) -> tuple[np.ndarray, ...]:
+    """The same away from the pole alpha = phi'."""
+    x_h = t_h = t_e = t_m = np.zeros(pole.shape, complex)
+    if shares[0]:
         pole = np.where(np.abs(np.sin(pole)) < LEAST_ANGLE, pole - LEAST_ANGLE, pole)
         gap = np.cos(phi / number) - np.cos(pole / number)
-        t_h = 2j / (number * sine) * np.sin(pole / number) / (np.sin(pole) * gap)
-        t_s = -2 / number * np.sin(phi / number) / gap
-        across = across + h_t * t_h
-        along = along - 1j * (cosine * h_t * (2 / number + 1j * wave * sine * t_h) + e_t * t_s) / sine**2
-    return np.asarray((across[..., None] * x + along[..., None] * t) / len(sides))
+        x_h = 2j / (number * sine) * np.sin(pole / number) / (np.sin(pole) * gap)
+        t_h = -1j * cosine * (2 / number + 1j * mu * sine * x_h) / sine**2
+        t_e = 2j / number * np.sin(phi / number) / (gap * sine**2)
+    if shares[1]:
+        lit = np.where(phi < np.pi, 2j * shares[1] / (sine * (np.cos(phi) + mu)), 0)
+        x_h, t_m = x_h + lit, -lit
+    return tuple(np.array(one) for one in (x_h, t_h, t_e, t_m))
 
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
