@@ -9,13 +9,15 @@ diffracted ray that grazes the face, sin beta' x_1 + cos beta' t, with the phase
 at alpha, cos alpha = -mu (Michaeli):
 
     mu  = [u_r.x_1 + cot beta' (u_r.t - cos beta')]/sin beta'
-    T_h = 2j/(N k sin beta') sin(alpha/N)/(sin alpha (cos(phi'/N) - cos(alpha/N)))
-    T_s = -2/N sin(phi'/N)/(cos(phi'/N) - cos(alpha/N))
+    c_N(x) = cot(x/(2 N))/N
+    T_h = j/(k sin beta' sin alpha) [c_N(alpha - phi') + c_N(alpha + phi')]
+    T_s = c_N(alpha + phi') - c_N(alpha - phi')
     K_x = eta H_t T_h
     K_t = [-j cos beta' eta H_t (2/N + j k mu sin beta' T_h) - j E_t T_s]/(k sin^2 beta')
 
-Physical optics of the same strips is K = 2 n x eta H j/(k sin beta' (cos phi' + mu)) where the face is lit,
-phi' < pi. The difference, the fringe currents, scatters from a length dl of the edge
+A plane is a wedge with N = 1: physical optics of the same strips, K = 2 n x eta H j/(k sin beta' (cos phi' + mu)), has
+the same form with N = 1 where the face is lit, phi' < pi. The difference, the fringe currents, scatters from a length
+dl of the edge
 
     a = k/(2 sqrt(pi)) e_r.K dl,   |a|^2 = radar cross section, m^2
 
@@ -39,7 +41,9 @@ import numpy as np
 from ..base.vectors import cross
 from .physical_optics import UP, polarisation
 
-NUDGE = 1e-4  # rad: nearer to a pole that total and physical optics share, both are taken at either side of it
+NEAR = (
+    0.1  # rad, to a pole that all currents and those of physical optics share: their difference is a series, to 1e-12
+)
 LEAST_ANGLE = 1e-7  # rad, of alpha from 0 and pi: sin(alpha/N)/sin(alpha) has a limit at 0
 LEAST_SINE = 1e-4  # of beta': a wave along the edge is taken at this angle from it
 
@@ -102,75 +106,53 @@ def strip_current(
 @dataclass(frozen=True, eq=False)
 class _StripResponse:
     """Currents of both faces for any incident field: for each face its axes x and t (..., 3), and what multiplies H_t
-    in K_x, and H_t, E_t and H_x in K_t (...)."""
+    in K_x, and H_t and E_t in K_t (...)."""
 
     faces: tuple[tuple[np.ndarray, np.ndarray, tuple[np.ndarray, ...]], ...]
 
     @classmethod
     def of(cls, wedge: WedgeShape, to_tx: np.ndarray, to_rx: np.ndarray, shares: tuple[int, int]) -> _StripResponse:
         """shares  of all currents, and of those of physical optics, in the sum"""
-        t, n, number = wedge.tangent, wedge.normal, wedge.number
-        outside = np.pi * number
+        t, n, outside = wedge.tangent, wedge.normal, np.pi * wedge.number
         other = np.cos(outside)[..., None] * wedge.inward + np.sin(outside)[..., None] * n  # x_2
         angle = np.arctan2(_dot(n, to_tx), _dot(wedge.inward, to_tx)) % (2 * np.pi)
-        is_outside = angle <= outside
-        faces = []
+        is_outside, faces = angle <= outside, []
         for x, along, phi in ((wedge.inward, t, angle), (other, -t, outside - angle)):
             cosine = -_dot(to_tx, along)
             sine = np.maximum(np.sqrt(np.maximum(1 - cosine**2, 0)), LEAST_SINE)
             mu = (_dot(to_rx, x) + cosine / sine * (_dot(to_rx, along) - cosine)) / sine
-            phi, mu, cosine, sine, number = np.broadcast_arrays(np.clip(phi, 0, outside), mu, cosine, sine, number)
-            factors = _factors(phi, mu, cosine, sine, number, shares)
+            factors = _factors(np.clip(phi, 0, outside), mu, cosine, sine, wedge.number, shares)
             faces.append((x, along, tuple(np.where(is_outside, one, 0) for one in factors)))
         return cls(tuple(faces))
 
     def current(self, to_tx: np.ndarray, field: np.ndarray) -> np.ndarray:
         """k K, complex128 (..., 3), for an incident electric field (..., 3)."""
         magnetic, out = cross(-to_tx, field), np.zeros((), complex)
-        for x, t, (x_h, t_h, t_e, t_m) in self.faces:
+        for x, t, (x_h, t_h, t_e) in self.faces:
             h_t = _dot(magnetic, t)
-            along = t_h * h_t + t_e * _dot(field, t) + t_m * _dot(magnetic, x)
-            out = out + (x_h * h_t)[..., None] * x + along[..., None] * t
+            out = out + (x_h * h_t)[..., None] * x + (t_h * h_t + t_e * _dot(field, t))[..., None] * t
         return np.asarray(out)
 
 
 def _factors(
     phi: np.ndarray, mu: np.ndarray, cosine: np.ndarray, sine: np.ndarray, number: np.ndarray, shares: tuple[int, int]
-) -> tuple[np.ndarray, ...]:
-    """What multiplies H_t in K_x, and H_t, E_t and H_x in K_t, complex128 (...), of one face."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What multiplies H_t in K_x, and H_t and E_t in K_t, complex128 (...), of one face."""
     alpha = np.arccos(-mu - 0j)  # from below the cut: a wave along the strip decays
-    near = np.abs(alpha - phi) < NUDGE
-    pole = np.where(near, phi + NUDGE, alpha)
-    out = _factors_at(pole, phi, np.where(near, -np.cos(pole), mu), cosine, sine, number, shares)
-    if near.any():
-        p, c, s, n = (a[near] for a in (phi, cosine, sine, number))
-        pole = p - NUDGE + 0j
-        for every, other in zip(out, _factors_at(pole, p, -np.cos(pole), c, s, n, shares), strict=True):
-            every[near] = (every[near] + other) / 2
-    return out
+    alpha = np.where(np.abs(np.sin(alpha)) < LEAST_ANGLE, alpha - LEAST_ANGLE, alpha)
+    every, lit = shares[0], shares[1] * (phi < np.pi)
+    one, two = (_poles(angle, number, every, lit) for angle in (alpha - phi, alpha + phi))
+    x_h = 1j / (sine * np.sin(alpha)) * (one + two)
+    t_h = -1j * cosine * (2 * (every / number + lit) + 1j * mu * sine * x_h) / sine**2
+    return x_h, t_h, 1j * (one - two) / sine**2
 
 
-def _factors_at(
-    pole: np.ndarray,
-    phi: np.ndarray,
-    mu: np.ndarray,
-    cosine: np.ndarray,
-    sine: np.ndarray,
-    number: np.ndarray,
-    shares: tuple[int, int],
-) -> tuple[np.ndarray, ...]:
-    """The same away from the pole alpha = phi'."""
-    x_h = t_h = t_e = t_m = np.zeros(pole.shape, complex)
-    if shares[0]:
-        pole = np.where(np.abs(np.sin(pole)) < LEAST_ANGLE, pole - LEAST_ANGLE, pole)
-        gap = np.cos(phi / number) - np.cos(pole / number)
-        x_h = 2j / (number * sine) * np.sin(pole / number) / (np.sin(pole) * gap)
-        t_h = -1j * cosine * (2 / number + 1j * mu * sine * x_h) / sine**2
-        t_e = 2j / number * np.sin(phi / number) / (gap * sine**2)
-    if shares[1]:
-        lit = np.where(phi < np.pi, 2j * shares[1] / (sine * (np.cos(phi) + mu)), 0)
-        x_h, t_m = x_h + lit, -lit
-    return tuple(np.array(one) for one in (x_h, t_h, t_e, t_m))
+def _poles(angle: np.ndarray, number: np.ndarray, every: int, lit: np.ndarray) -> np.ndarray:
+    """every cot(x/2N)/N + lit cot(x/2), complex128 (...): where they cancel at small x, by their series."""
+    x = np.where(np.abs(angle) < LEAST_ANGLE, LEAST_ANGLE, angle)
+    direct = every / (number * np.tan(x / (2 * number))) + np.where(lit != 0, lit / np.tan(x / 2), 0)
+    series = sum(x**m / d * (1 - number ** -(m + 1.0)) for m, d in ((1, 6), (3, 360), (5, 15120)))
+    return np.asarray(np.where((np.abs(x) < NEAR) & (every + lit == 0), series, direct))
 
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -29,6 +29,7 @@ PER_SIZE = 64  # pieces over the size of a scene with shadows, at least: these a
 # Samples: phasors of so many next to one another are products of two factors. Matrices of so many rows and columns are
 # multiplied: for larger ones OpenBLAS starts threads, which mostly wait for one another
 STEP = 32
+STEEP = 16.0  # change of coefficients over that of directions, rad, at most: near grazing incidence they change fastest
 TOGETHER = 2**16  # pairs of pulse and piece that are looked at together: 3 MB for each vector of them
 AMPLITUDES = 2**21  # of pairs, polarisations and frequencies, complex128, that are held together: 32 MB
 
@@ -82,7 +83,7 @@ class PreparedEdges:
         size = float(np.linalg.norm(np.diff(scene.bounds, axis=0)))
         pieces = edge_pieces(scene, crease, longest if device is None else min(longest, size / PER_SIZE))
         light = None if device is None or not len(pieces) else EdgeLight(pieces, device, scene)
-        return cls(pieces, EdgeKnots.of(pieces, distance, error / 4), light, error)
+        return cls(pieces, EdgeKnots.of(pieces, distance, error / STEEP), light, error)
 
 
 @dataclass(frozen=True, eq=False)
