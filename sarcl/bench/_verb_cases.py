@@ -23,10 +23,13 @@ from ..model.trajectory import Trajectory
 from ..model.waveform import Waveform
 from ..opencl.device import Device
 from ..reference import equations
+from ..reference.edges import edge_echo
 from ..reference.polar_format import polar_format
+from ..scattering.physical_optics import triangle_integral
 from ..scene import shapes
 from ..scene.material import Material
 from ..scene.scene import Scene
+from ..scene.triangles import normals
 from . import exact
 
 CENTER = 9.6e9  # Hz, of all cases but those of arrays and the full wave
@@ -120,6 +123,46 @@ def facets(name: str, n: int) -> VerbCase:
     scene = Scene.from_heights(axis, axis, hills, material=rough) + box
     call = functools.partial(verbs.echo, scene, CHIRP, straight(64, 100.0))
     return VerbCase(name, n, 64 * len(scene.triangles), call, measured)
+
+
+def town(name: str, n: int, **options: object) -> VerbCase:
+    """n metal boxes on metal ground, 3 m apart, shadows, 64 pulses over 100 m."""
+    random, side = np.random.default_rng(0), int(np.ceil(np.sqrt(n)))
+    scene = shapes.plate((3.0 * side, 3.0 * side))
+    for i, (size, turn) in enumerate(zip(random.uniform(0.5, 2, (n, 3)), random.uniform(0, 2, n), strict=True)):
+        place = 3 * (i % side) - 1.5 * side + 1.5, 3 * (i // side) - 1.5 * side + 1.5, 0.01
+        scene = scene + shapes.box(tuple(size), position=place, rotation=(0, 0, turn))
+    call = functools.partial(verbs.echo, scene, CHIRP, straight(64, 100.0), **options)
+    return VerbCase(name, n, 64 * len(scene.triangles), call, measured)
+
+
+def cross_section(name: str, n: int) -> VerbCase:
+    """A box of facets with legs of 1/n m, with its edges, from 360 directions; against sums over all in float64."""
+    box = shapes.box((1.0, 0.7, 0.5), rotation=(0.2, 0.1, 0.4)).split(1 / n)
+    azimuth, elevation, k = np.radians(np.arange(360.0)), 0.5, 2 * np.pi * CENTER / SPEED_OF_LIGHT
+    some = np.random.default_rng(0).integers(0, 360, CHECKED)
+
+    def call(*, check: bool, **options: Any) -> np.ndarray:
+        return verbs.rcs(box, azimuth, elevation, CENTER, edges=True, **options)
+
+    def compare(s: np.ndarray) -> Errors:
+        from ..scene.wedges import wedges  # imports scipy
+
+        wanted = np.zeros(CHECKED, complex)
+        edges = wedges(box.triangles, box.two_sided, 0.35)
+        for i, a in enumerate(azimuth[some]):
+            look = np.array([np.cos(elevation) * np.cos(a), np.cos(elevation) * np.sin(a), np.sin(elevation)])
+            facets = box.triangles[normals(box.triangles) @ look > 0]
+            cosine = normals(facets) @ look
+            parts = k / np.sqrt(np.pi) * cosine * triangle_integral(facets, 2 * k * look)
+            parts = parts * np.exp(2j * k * facets.mean(axis=1) @ look)
+            far, f = 1e7 * look, np.array([CENTER])
+            for ends, *frame in zip(edges.ends, edges.inward, edges.normal, edges.number, strict=True):
+                parts = np.append(parts, edge_echo(ends, tuple(frame), f, far, far, 1e7)[0, 0, 0])
+            wanted[i] = parts.sum()
+        return relative(s[some], wanted, 0.0)
+
+    return VerbCase(name, n, 360 * len(box.triangles), call, compare)
 
 
 def spectral_echo(name: str, n: int) -> VerbCase:
@@ -241,6 +284,18 @@ TASKS: Mapping[str, VerbTask] = {
     "echo of facets": VerbTask(
         facets, "hills of 2 n^2 rough facets with legs of 1 m and a metal box on them, shadows, 64 pulses",
         "facets x pulses", (32, 64, 128, 256), (32, 64), tolerances=(1e-1, 1e-2),
+    ),
+    "echo with edges": VerbTask(
+        functools.partial(town, edges=True), "n metal boxes of 0.5 to 2 m on metal ground and their edges, 64 pulses",
+        "facets x pulses", (16, 64, 256), (8, 16), tolerances=(1e-1, 1e-2),
+    ),
+    "echo with bounces": VerbTask(
+        functools.partial(town, bounces=3), "n metal boxes of 0.5 to 2 m on metal ground, 3 reflections, 64 pulses",
+        "facets x pulses", (8, 16), (8, 12), tolerances=(1e-1, 1e-2),
+    ),
+    "radar cross section": VerbTask(
+        cross_section, "a box with its edges, facets with legs of 1/n m, from 360 directions", "facets x directions",
+        (8, 12, 16), (8,), tolerances=(1e-2, 1e-4),
     ),
     "spectral echo": VerbTask(
         spectral_echo, "n points beside a straight track of n pulses 0.4 m apart, a Gaussian beam of 0.7 deg",

@@ -9,6 +9,7 @@ For other folders:
     backproject    the image equation, term by term
     bounces        echoes that facets reflect to one another, by every sequence of facets
     certain_shadows  shadows that miss a facet, or cover it, whatever antenna of several casts them
+    edges          echoes of edges by short elements
     equations      delay, echo, matched filter, image, array, full-wave updates, waveform forming: in a textbook's order
     facet          echo of triangular facets by physical optics
     facet_pieces   pieces of rough facets, and their random numbers

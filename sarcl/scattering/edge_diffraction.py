@@ -9,13 +9,15 @@ diffracted ray that grazes the face, sin beta' x_1 + cos beta' t, with the phase
 at alpha, cos alpha = -mu (Michaeli):
 
     mu  = [u_r.x_1 + cot beta' (u_r.t - cos beta')]/sin beta'
-    T_h = 2j/(N k sin beta') sin(alpha/N)/(sin alpha (cos(phi'/N) - cos(alpha/N)))
-    T_s = -2/N sin(phi'/N)/(cos(phi'/N) - cos(alpha/N))
+    c_N(x) = cot(x/(2 N))/N
+    T_h = j/(k sin beta' sin alpha) [c_N(alpha - phi') + c_N(alpha + phi')]
+    T_s = c_N(alpha + phi') - c_N(alpha - phi')
     K_x = eta H_t T_h
     K_t = [-j cos beta' eta H_t (2/N + j k mu sin beta' T_h) - j E_t T_s]/(k sin^2 beta')
 
-Physical optics of the same strips is K = 2 n x eta H j/(k sin beta' (cos phi' + mu)) where the face is lit,
-phi' < pi. The difference, the fringe currents, scatters from a length dl of the edge
+A plane is a wedge with N = 1: physical optics of the same strips, K = 2 n x eta H j/(k sin beta' (cos phi' + mu)), has
+the same form with N = 1 where the face is lit, phi' < pi. The difference, the fringe currents, scatters from a length
+dl of the edge
 
     a = k/(2 sqrt(pi)) e_r.K dl,   |a|^2 = radar cross section, m^2
 
@@ -39,7 +41,9 @@ import numpy as np
 from ..base.vectors import cross
 from .physical_optics import UP, polarisation
 
-NUDGE = 1e-4  # rad: nearer to a pole that total and physical optics share, both are taken at either side of it
+NEAR = (
+    0.1  # rad, to a pole that all currents and those of physical optics share: their difference is a series, to 1e-12
+)
 LEAST_ANGLE = 1e-7  # rad, of alpha from 0 and pi: sin(alpha/N)/sin(alpha) has a limit at 0
 LEAST_SINE = 1e-4  # of beta': a wave along the edge is taken at this angle from it
 
@@ -76,13 +80,12 @@ def edge_matrix(
     to_tx, to_rx  unit vectors (..., 3) from the edge to the antennas. A transmitter inside of the wedge: 0.
     optics        those of physical optics instead
     """
-    received = polarisation(-to_rx, up)
+    sent = polarisation(-to_tx, up)
+    received = sent if to_rx is to_tx else polarisation(-to_rx, up)
     out = np.empty((*np.broadcast_shapes(wedge.number.shape, to_tx.shape[:-1], to_rx.shape[:-1]), 2, 2), complex)
-    for j, field in enumerate(polarisation(-to_tx, up)):
-        if optics:
-            current = strip_current(wedge, to_tx, to_rx, field, optics=True)
-        else:
-            current = fringe_current(wedge, to_tx, to_rx, field)
+    response = _StripResponse.of(wedge, to_tx, to_rx, (0, 1) if optics else (1, -1))
+    for j, field in enumerate(sent):
+        current = response.current(to_tx, field)
         for i, r in enumerate(received):
             out[..., i, j] = _dot(r, current) / (2 * np.sqrt(np.pi))
     return (out + out.swapaxes(-1, -2)) / 2 if to_rx is to_tx else out  # one antenna
@@ -90,56 +93,66 @@ def edge_matrix(
 
 def fringe_current(wedge: WedgeShape, to_tx: np.ndarray, to_rx: np.ndarray, field: np.ndarray) -> np.ndarray:
     """k K of both faces, complex128 (..., 3), for an incident electric field (..., 3) of unit amplitude."""
-    return strip_current(wedge, to_tx, to_rx, field) - strip_current(wedge, to_tx, to_rx, field, optics=True)
+    return _StripResponse.of(wedge, to_tx, to_rx, (1, -1)).current(to_tx, field)
 
 
 def strip_current(
     wedge: WedgeShape, to_tx: np.ndarray, to_rx: np.ndarray, field: np.ndarray, *, optics: bool = False
 ) -> np.ndarray:
     """k K of the currents on both faces, complex128 (..., 3), all of them or those of physical optics."""
-    t, n, number = wedge.tangent, wedge.normal, wedge.number
-    angle = np.arctan2(_dot(n, to_tx), _dot(wedge.inward, to_tx)) % (2 * np.pi)
-    outside = np.pi * number
-    other = np.cos(outside)[..., None] * wedge.inward + np.sin(outside)[..., None] * n  # x_2
-    one, two = (
-        _face(frame, np.clip(phi, 0, outside), number, (to_tx, to_rx), field, optics)
-        for frame, phi in (((wedge.inward, t), angle), ((other, -t), outside - angle))
-    )
-    return np.asarray(np.where((angle <= outside)[..., None], one + two, 0))
+    return _StripResponse.of(wedge, to_tx, to_rx, (0, 1) if optics else (1, 0)).current(to_tx, field)
 
 
-def _face(
-    frame: tuple[np.ndarray, np.ndarray],
-    phi: np.ndarray,
-    number: np.ndarray,
-    looks: tuple[np.ndarray, np.ndarray],
-    field: np.ndarray,
-    optics: bool,
-) -> np.ndarray:
-    """k K of one face with axes x and t, complex128 (..., 3)."""
-    x, t = frame
-    cosine = -_dot(looks[0], t)
-    sine = np.maximum(np.sqrt(np.maximum(1 - cosine**2, 0)), LEAST_SINE)
-    mu = (_dot(looks[1], x) + cosine / sine * (_dot(looks[1], t) - cosine)) / sine
-    magnetic = cross(-looks[0], field)
-    h_t, e_t = _dot(magnetic, t), _dot(field, t)
+@dataclass(frozen=True, eq=False)
+class _StripResponse:
+    """Currents of both faces for any incident field: for each face its axes x and t (..., 3), and what multiplies H_t
+    in K_x, and H_t and E_t in K_t (...)."""
+
+    faces: tuple[tuple[np.ndarray, np.ndarray, tuple[np.ndarray, ...]], ...]
+
+    @classmethod
+    def of(cls, wedge: WedgeShape, to_tx: np.ndarray, to_rx: np.ndarray, shares: tuple[int, int]) -> _StripResponse:
+        """shares  of all currents, and of those of physical optics, in the sum"""
+        t, n, outside = wedge.tangent, wedge.normal, np.pi * wedge.number
+        other = np.cos(outside)[..., None] * wedge.inward + np.sin(outside)[..., None] * n  # x_2
+        angle = np.arctan2(_dot(n, to_tx), _dot(wedge.inward, to_tx)) % (2 * np.pi)
+        is_outside, faces = angle <= outside, []
+        for x, along, phi in ((wedge.inward, t, angle), (other, -t, outside - angle)):
+            cosine = -_dot(to_tx, along)
+            sine = np.maximum(np.sqrt(np.maximum(1 - cosine**2, 0)), LEAST_SINE)
+            mu = (_dot(to_rx, x) + cosine / sine * (_dot(to_rx, along) - cosine)) / sine
+            factors = _factors(np.clip(phi, 0, outside), mu, cosine, sine, wedge.number, shares)
+            faces.append((x, along, tuple(np.where(is_outside, one, 0) for one in factors)))
+        return cls(tuple(faces))
+
+    def current(self, to_tx: np.ndarray, field: np.ndarray) -> np.ndarray:
+        """k K, complex128 (..., 3), for an incident electric field (..., 3)."""
+        magnetic, out = cross(-to_tx, field), np.zeros((), complex)
+        for x, t, (x_h, t_h, t_e) in self.faces:
+            h_t = _dot(magnetic, t)
+            out = out + (x_h * h_t)[..., None] * x + (t_h * h_t + t_e * _dot(field, t))[..., None] * t
+        return np.asarray(out)
+
+
+def _factors(
+    phi: np.ndarray, mu: np.ndarray, cosine: np.ndarray, sine: np.ndarray, number: np.ndarray, shares: tuple[int, int]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What multiplies H_t in K_x, and H_t and E_t in K_t, complex128 (...), of one face."""
     alpha = np.arccos(-mu - 0j)  # from below the cut: a wave along the strip decays
-    near = np.abs(alpha - phi) < NUDGE
-    sides = [np.where(near, phi + step, alpha) for step in (NUDGE, -NUDGE)] if near.any() else [alpha]
-    across = along = np.zeros((), complex)
-    for pole in sides:
-        wave = np.where(near, -np.cos(pole), mu)
-        if optics:
-            lit = np.where(phi < np.pi, 2j / (sine * (np.cos(phi) + wave)), 0)
-            across, along = across + h_t * lit, along - _dot(magnetic, x) * lit
-            continue
-        pole = np.where(np.abs(np.sin(pole)) < LEAST_ANGLE, pole - LEAST_ANGLE, pole)
-        gap = np.cos(phi / number) - np.cos(pole / number)
-        t_h = 2j / (number * sine) * np.sin(pole / number) / (np.sin(pole) * gap)
-        t_s = -2 / number * np.sin(phi / number) / gap
-        across = across + h_t * t_h
-        along = along - 1j * (cosine * h_t * (2 / number + 1j * wave * sine * t_h) + e_t * t_s) / sine**2
-    return np.asarray((across[..., None] * x + along[..., None] * t) / len(sides))
+    alpha = np.where(np.abs(np.sin(alpha)) < LEAST_ANGLE, alpha - LEAST_ANGLE, alpha)
+    every, lit = shares[0], shares[1] * (phi < np.pi)
+    one, two = (_poles(angle, number, every, lit) for angle in (alpha - phi, alpha + phi))
+    x_h = 1j / (sine * np.sin(alpha)) * (one + two)
+    t_h = -1j * cosine * (2 * (every / number + lit) + 1j * mu * sine * x_h) / sine**2
+    return x_h, t_h, 1j * (one - two) / sine**2
+
+
+def _poles(angle: np.ndarray, number: np.ndarray, every: int, lit: np.ndarray) -> np.ndarray:
+    """every cot(x/2N)/N + lit cot(x/2), complex128 (...): where they cancel at small x, by their series."""
+    x = np.where(np.abs(angle) < LEAST_ANGLE, LEAST_ANGLE, angle)
+    direct = every / (number * np.tan(x / (2 * number))) + np.where(lit != 0, lit / np.tan(x / 2), 0)
+    series = sum(x**m / d * (1 - number ** -(m + 1.0)) for m, d in ((1, 6), (3, 360), (5, 15120)))
+    return np.asarray(np.where((np.abs(x) < NEAR) & (every + lit == 0), series, direct))
 
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -109,8 +109,8 @@ def exact(
             value, power = _exact(part, view, pulse)
             values, powers = values + value, powers + power
     if scene.edges is not None:
-        value, power, _ = EdgeEchoes(scene.edges, view).samples(pulse, frequencies, exact=True)
-        values, powers = values + value, powers + power
+        for _, value, power in EdgeEchoes(scene.edges, view).exactly(np.array([pulse]), frequencies):
+            values, powers = values + value[0], powers + power[0]
     if scene.bounced is not None:
         values = values + _bounced(scene.bounced, view, pulse)
     return values, powers

@@ -11,7 +11,10 @@ from sarcl import verbs as all_verbs
 from sarcl.bench import tables, verb_pictures, verbs
 from sarcl.cli import parser
 
-SIZES = {"channels of an array": 9, "spectral echo": 512, "range-Doppler": 256, "full wave": 16, "beam of an array": 8}
+SIZES = {
+    "channels of an array": 9, "spectral echo": 512, "range-Doppler": 256, "full wave": 16, "beam of an array": 8,
+    "echo with edges": 8, "echo with bounces": 8, "radar cross section": 8,
+}  # fmt: skip
 SLOW = ("full wave", "echo of facets")
 
 

@@ -142,6 +142,15 @@ def test_the_fringe_is_finite_and_smooth_at_shadow_and_reflection_boundaries(num
                 assert np.abs(near[2] - near[4]).max() < 1e-3 * (1 + np.abs(near).max())
 
 
+@pytest.mark.parametrize("number", [1.2, 1.5, 2.0])
+def test_the_fringe_beside_a_boundary_is_all_currents_less_physical_optics(number):
+    """0.09 rad from it a series takes the place of the difference."""
+    for field in (Z, np.cross(at(0.8), Z)):
+        looks = wedge(number), at(0.8), at(np.pi - 0.8 + 0.09), field
+        wanted = strip_current(*looks) - strip_current(*looks, optics=True)
+        assert np.abs(fringe_current(*looks) - wanted).max() < 1e-11
+
+
 def test_the_fringe_is_finite_along_the_edge_along_a_face_and_in_its_plane():
     looks = np.array([Z, -Z, X, -X, Y, at(1.2, 1 - 1e-9), at(0.0, 0.3), at(np.pi, -0.6)])
     for number in (1.5, 2.0):

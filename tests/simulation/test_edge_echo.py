@@ -5,9 +5,7 @@ import pytest
 
 import sarcl
 from sarcl import Material, Scene, Trajectory, Waveform, shapes
-from sarcl.base.constants import SPEED_OF_LIGHT
-from sarcl.base.vectors import unit
-from sarcl.scattering.edge_diffraction import WedgeShape, edge_matrix
+from sarcl.reference.edges import edge_echo
 from sarcl.scene.wedges import wedges
 
 CHIRP = Waveform.chirp(center=9.6e9, bandwidth=300e6, duration=1e-6)
@@ -34,30 +32,18 @@ def edges_alone(scene, track, *, tolerance=1e-3, **options):
 
 
 def summed(scene, raw, track, receiver=None, seen=None, per_wave=20):
-    """Elements of a 20th of a wavelength, or as many as asked for, each a plane wave with the directions and the path
-    of its own, float64; and the norm of the edges at random phases. seen(places, antenna): where one sees them."""
+    """The reference: elements of a 20th of a wavelength, or as many as asked for; and the norm of the edges at random
+    phases."""
     edges = wedges(scene.triangles, scene.two_sided, 0.35)
     frequencies = raw.frequency[0] + raw.frequency_step[0] * np.arange(raw.n_samples)
     out, power = np.zeros((len(track.positions), 3, raw.n_samples), complex), 0.0
     rx = track.positions if receiver is None else receiver.positions
     for p, (to, back) in enumerate(zip(track.positions, rx, strict=True)):
         reference = (np.linalg.norm(to) + np.linalg.norm(back)) / 2
-        for i in range(len(edges)):
-            start, way = edges.ends[i, 0], edges.ends[i, 1] - edges.ends[i, 0]
-            n = int(np.linalg.norm(way) * per_wave * 9.75e9 / SPEED_OF_LIGHT) + 1
-            places = start + (np.arange(n) + 0.5)[:, None] / n * way
-            looks = [unit(to - places)] * 2 if receiver is None else [unit(end - places) for end in (to, back)]
-            shape = WedgeShape(
-                np.tile(edges.inward[i], (n, 1)), np.tile(edges.normal[i], (n, 1)), np.full(n, edges.number[i])
-            )
-            matrix = edge_matrix(shape, *looks) * np.linalg.norm(way) / n
-            if seen is not None:
-                matrix *= (seen(places, to) & seen(places, back))[:, None, None]
-            path = np.linalg.norm(places - to, axis=1) + np.linalg.norm(places - back, axis=1) - 2 * reference
-            waves = 2 * np.pi * frequencies / SPEED_OF_LIGHT
-            turn = waves * ((looks[0] + looks[1]) @ way / n)[:, None]
-            wave = np.exp(-1j * waves * path[:, None]) * np.sinc(turn / (2 * np.pi))
-            one = np.einsum("krt,kn->rtn", matrix, wave)[[0, 0, 1], [0, 1, 1]]
+        for ends, *frame in zip(edges.ends, edges.inward, edges.normal, edges.number, strict=True):
+            options = {"seen": seen, "per_wavelength": per_wave}
+            one = edge_echo(ends, tuple(frame), frequencies, to, back, reference, **options)
+            one = one.transpose(1, 2, 0)[[0, 0, 1], [0, 1, 1]]
             out[p], power = out[p] + one, power + (np.abs(one) ** 2).sum()
     return out, np.sqrt(power)
 

@@ -1,94 +1,80 @@
-"""Edges of conductors cut into pieces, the part of each that antennas see, and its amplitude."""
+"""Edges of conductors cut into pieces, and the part of each that antennas see."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from ...numerics.pulse_geometry import PulseGeometry
+from ...base.vectors import dot
 from ...opencl.device import Device
-from ...scattering.edge_diffraction import WedgeShape, edge_matrix
+from ...scattering.edge_diffraction import WedgeShape
 from ...scene.scene import Scene
 from ...visibility.rays import SceneRays
 
-INSET = 1e-4  # of an edge's length: its ends are looked at from so far inside, where only two facets meet
+INSET = 1e-4  # of a piece's length: the ends of edges are looked at from so far inside, where only two facets meet
 OFF = 4.0  # over the least distance of rays: points on an edge are moved out of the facets by so much
 HALVINGS = 12  # of the piece in which a shadow ends: its length is then known to 1/4096
 
 
 @dataclass(frozen=True, eq=False)
 class EdgePieces:
-    """Pieces of straight edges.
+    """Straight edges in pieces of equal length, and the corners between these, edge by edge.
 
-    ends    m (n, 2, 3);  shape  of their wedges;  factor  reflectivity of their faces (n,)
-    n_edges, n_other  numbers of edges, and of those left out: not smooth perfect conductors on both faces
-    longest_edge  m
+    ends     m (e, 2, 3);  shape  of their wedges;  factor  reflectivity of their faces (e,)
+    parts    number of pieces of each (e,)
+    n_other  number of edges left out: not smooth perfect conductors on both faces
     """
 
     ends: np.ndarray
     shape: WedgeShape
     factor: np.ndarray
-    n_edges: int
+    parts: np.ndarray
     n_other: int
-    longest_edge: float
 
     def __len__(self) -> int:
-        return len(self.ends)
+        return int(self.parts.sum())
 
-    @property
-    def centers(self) -> np.ndarray:
-        """m (n, 3)."""
-        return np.asarray(self.ends.mean(axis=1))
+    @cached_property
+    def edge(self) -> np.ndarray:
+        """The edge of each piece (n,)."""
+        return np.repeat(np.arange(len(self.parts)), self.parts)
+
+    @cached_property
+    def first(self) -> np.ndarray:
+        """The corner at which each piece begins (n,); it ends at the next one."""
+        return np.arange(len(self)) + self.edge
+
+    @cached_property
+    def corner_edge(self) -> np.ndarray:
+        """The edge of each corner (n + e,)."""
+        return np.repeat(np.arange(len(self.parts)), self.parts + 1)
+
+    @cached_property
+    def corner_share(self) -> np.ndarray:
+        """Where on its edge each corner lies, 0 to 1 (n + e,)."""
+        begins = np.cumsum(self.parts + 1) - self.parts - 1
+        return np.asarray((np.arange(len(self.corner_edge)) - begins[self.corner_edge]) / self.parts[self.corner_edge])
+
+    @cached_property
+    def corners(self) -> np.ndarray:
+        """m (n + e, 3)."""
+        return self.places(self.corner_edge, self.corner_share)
+
+    def places(self, edges: np.ndarray, shares: np.ndarray) -> np.ndarray:
+        """Points on edges, m (..., 3)."""
+        start = self.ends[edges, 0]
+        return np.asarray(start + shares[..., None] * (self.ends[edges, 1] - start))
 
     @property
     def lengths(self) -> np.ndarray:
-        """m (n,)."""
+        """Of edges, m (e,)."""
         return np.asarray(np.linalg.norm(self.ends[:, 1] - self.ends[:, 0], axis=1))
 
-    def chosen(self, rows: np.ndarray) -> EdgePieces:
-        """Some of them."""
-        shape = WedgeShape(self.shape.inward[rows], self.shape.normal[rows], self.shape.number[rows])
-        return EdgePieces(self.ends[rows], shape, self.factor[rows], self.n_edges, self.n_other, self.longest_edge)
-
-    def amplitudes(
-        self,
-        antennas: PulseGeometry,
-        pulse: int,
-        lit: np.ndarray,
-        waves: np.ndarray,
-        polarizations: Sequence[str],
-        vertical: np.ndarray,
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Amplitudes of the pieces at a pulse, complex128 (n, n_polarizations, m), |a|^2 in m^2, and their ranges about
-        the pulse's reference range, m, longdouble (n,), that these refer to.
-
-        lit    where the part that both antennas see begins and ends, 0 to 1 along each piece (n, 2)
-        waves  wave numbers 2 pi f/c, rad/m (m,)
-
-        a = F L integral exp(j psi (s - 1/2)) ds over the lit part, where psi is k times the difference of the paths
-        over both ends: phases meet from piece to piece, so that errors of their curvature are not added up along an
-        edge. F is that of the middle of the lit part, between both ends.
-        """
-        ends = [antennas.tx[pulse], antennas.rx[pulse]][: 1 if antennas.is_monostatic else 2]
-        up = tuple(float(x) for x in vertical)
-        paths, matrices = [], []
-        for places in self.ends.transpose(1, 0, 2):
-            steps = [end.astype(np.longdouble) - places for end in ends]
-            lengths = [np.sqrt((step**2).sum(axis=1)) for step in steps]
-            paths.append(sum(lengths) / len(ends))
-            looks = [(step / length[:, None]).astype(np.float64) for step, length in zip(steps, lengths, strict=True)]
-            matrices.append(edge_matrix(self.shape, looks[0], looks[-1], up))  # type: ignore[arg-type]
-        columns = [("HV".index(name[0]), "HV".index(name[1])) for name in polarizations]
-        begin, end = ([matrix[:, r, t] for r, t in columns] for matrix in matrices)
-        slope, center = np.subtract(end, begin), np.add(begin, end) / 2
-        part, middle = lit[:, 1] - lit[:, 0], lit.sum(axis=1) / 2 - 0.5
-        phase = waves * (2 * (paths[0] - paths[1])).astype(np.float64)[:, None]
-        line = (self.factor * self.lengths * part)[:, None] * np.sinc(phase * part[:, None] / (2 * np.pi))
-        sums = (center + slope * middle)[..., None] * line * np.exp(1j * phase * middle[:, None])
-        reference = np.longdouble(antennas.reference_range[pulse])
-        return np.asarray(sums.transpose(1, 0, 2)), (paths[0] + paths[1]) / 2 - reference
+    def shapes(self, edges: np.ndarray) -> WedgeShape:
+        """Of some edges."""
+        return WedgeShape(self.shape.inward[edges], self.shape.normal[edges], self.shape.number[edges])
 
 
 def edge_pieces(scene: Scene, crease: float, longest: float) -> EdgePieces:
@@ -104,28 +90,55 @@ def edge_pieces(scene: Scene, crease: float, longest: float) -> EdgePieces:
     every = wedges(scene.triangles[part], scene.two_sided[part], crease)
     of_conductors = conductor[part[every.faces]]
     mine = every.chosen(np.flatnonzero(of_conductors.all(axis=1)))
-    faces = part[mine.faces]
     length = np.linalg.norm(mine.ends[:, 1] - mine.ends[:, 0], axis=1)
-    parts = np.maximum(np.ceil(length / longest), 1).astype(int)
-    row = np.repeat(np.arange(len(mine)), parts)
-    at = (np.arange(len(row)) - np.repeat(np.cumsum(parts) - parts, parts))[:, None] + [0, 1]
-    start, way = mine.ends[row, 0], mine.ends[row, 1] - mine.ends[row, 0]
-    ends = start[:, None] + (at / parts[row][:, None])[..., None] * way[:, None]
     return EdgePieces(
-        ends,
-        WedgeShape(mine.inward[row], mine.normal[row], mine.number[row]),
-        scene.reflectivity[faces].mean(axis=1)[row],
-        len(mine),
+        mine.ends,
+        WedgeShape(mine.inward, mine.normal, mine.number),
+        scene.reflectivity[part[mine.faces]].mean(axis=1),
+        np.maximum(np.ceil(length / longest), 1).astype(int),
         int(of_conductors.any(axis=1).sum()) - len(mine),
-        float(length.max(initial=0.0)),
     )
+
+
+@dataclass(frozen=True, eq=False)
+class EdgeKnots:
+    """Points on edges, edge by edge, between which coefficients are linear; one in the middle of a short or far edge.
+
+    edge    of each (k,);  places  m (k, 3);  first  of each edge (e,)
+    spans   number of intervals between those of each edge (e,)
+    """
+
+    edge: np.ndarray
+    places: np.ndarray
+    first: np.ndarray
+    spans: np.ndarray
+
+    @classmethod
+    def of(cls, pieces: EdgePieces, distance: float, tolerance: float) -> EdgeKnots:
+        """Knots for antennas at least at a distance R, m: over a length L directions turn by L/R, by half of it to the
+        middle, and coefficients deviate from a chord by an eighth of its square."""
+        turn = pieces.lengths / distance
+        spans = np.where(turn <= tolerance, 0, np.ceil(turn / np.sqrt(tolerance))).astype(int)
+        edge = np.repeat(np.arange(len(spans)), spans + 1)
+        first = np.cumsum(spans + 1) - spans - 1
+        share = np.where(spans[edge] > 0, (np.arange(len(edge)) - first[edge]) / np.maximum(spans[edge], 1), 0.5)
+        return cls(edge, pieces.places(edge, share), first, spans)
+
+    def around(self, edges: np.ndarray, shares: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Of points at shares of the lengths of edges (n,): the knots before and after each (n,), and the weight of the
+        latter."""
+        spans = self.spans[edges]
+        at = shares * spans
+        number = np.minimum(at.astype(int), np.maximum(spans - 1, 0))
+        before = self.first[edges] + number
+        return before, before + (spans > 0), at - number
 
 
 class EdgeLight:
     """What antennas see of pieces of edges past the facets of a scene.
 
-    Both ends of a piece are looked at. Where one is seen and the other is not, the end of the shadow is searched for by
-    halving. Shadows that begin and end within one piece are missed.
+    Corners of pieces are looked at. Where one end of a piece is seen and the other is not, the end of the shadow is
+    searched for by halving. Shadows that begin and end within one piece are missed.
     """
 
     def __init__(self, pieces: EdgePieces, device: Device, scene: Scene) -> None:
@@ -133,32 +146,49 @@ class EdgeLight:
         half = np.pi * pieces.shape.number[:, None] / 2  # along the middle of the space outside
         self._out = OFF * self.rays.least * (np.cos(half) * pieces.shape.inward + np.sin(half) * pieces.shape.normal)
 
-    def lit(self, antennas: Sequence[np.ndarray]) -> np.ndarray:
-        """Where the part of each piece begins and ends that antennas at places, m (3,), all see: (n, 2), 0 to 1."""
-        n = len(self.pieces)
-        every = np.arange(n)
-        seen = np.stack([self._seen(every, np.full(n, s), antennas) for s in (INSET, 1 - INSET)], axis=1)
-        lit = np.where(seen.all(axis=1, keepdims=True), [0.0, 1.0], 0.0)
-        part = np.flatnonzero(seen[:, 0] != seen[:, 1])
-        begins = seen[part, 0]
-        low, high = np.zeros(len(part)), np.ones(len(part))
-        for _ in range(HALVINGS if len(part) else 0):
+    def lit(self, antennas: list[np.ndarray]) -> np.ndarray:
+        """Where the part of each piece begins and ends that all antennas see: (m, n, 2), 0 to 1.
+
+        antennas  places of one or two, m (m, 3) each, at m pulses
+        """
+        pieces = self.pieces
+        pulse, corner = np.nonzero(self._faced(antennas)[:, pieces.corner_edge])
+        edge = pieces.corner_edge[corner]
+        inset = INSET / pieces.parts[edge]
+        seen = np.zeros((len(antennas[0]), len(pieces.corner_edge)), bool)
+        share = np.clip(pieces.corner_share[corner], inset, 1 - inset)
+        seen[pulse, corner] = self._seen(edge, share, [places[pulse] for places in antennas])
+        begins, ends = seen[:, pieces.first], seen[:, pieces.first + 1]
+        lit = np.where((begins & ends)[..., None], [0.0, 1.0], 0.0)
+        pulse, piece = np.nonzero(begins != ends)
+        is_begun, edge = begins[pulse, piece], pieces.edge[piece]
+        start, part = pieces.corner_share[pieces.first[piece]], 1 / pieces.parts[edge]
+        low, high = np.zeros(len(pulse)), np.ones(len(pulse))
+        for _ in range(HALVINGS if len(pulse) else 0):
             middle = (low + high) / 2
-            is_lit = self._seen(part, middle, antennas)
-            low, high = np.where(is_lit == begins, middle, low), np.where(is_lit == begins, high, middle)
+            is_lit = self._seen(edge, start + middle * part, [places[pulse] for places in antennas])
+            low, high = np.where(is_lit == is_begun, middle, low), np.where(is_lit == is_begun, high, middle)
         border = (low + high) / 2
-        lit[part] = np.where(begins[:, None], np.stack([0 * border, border], 1), np.stack([border, 0 * border + 1], 1))
+        lit[pulse, piece, 0], lit[pulse, piece, 1] = np.where(is_begun, 0, border), np.where(is_begun, border, 1)
         return lit
 
-    def _seen(self, rows: np.ndarray, at: np.ndarray, antennas: Sequence[np.ndarray]) -> np.ndarray:
-        """Whether all antennas see points at shares `at` of the lengths of pieces `rows`: (n,)."""
-        ends = self.pieces.ends[rows]
-        places = ends[:, 0] + at[:, None] * (ends[:, 1] - ends[:, 0]) + self._out[rows]
-        seen = np.ones(len(rows), bool)
+    def _faced(self, antennas: list[np.ndarray]) -> np.ndarray:
+        """Whether antennas are outside of the wedges of edges, which may be seen only from there: (m, e)."""
+        pieces, shape = self.pieces, self.pieces.shape
+        angle, out = np.pi * shape.number[:, None], np.ones((len(antennas[0]), len(pieces.ends)), bool)
+        normals = shape.normal, np.sin(angle) * shape.inward - np.cos(angle) * shape.normal
+        for places in antennas:
+            above = [places @ normal.T - dot(pieces.ends[:, 0], normal) for normal in normals]
+            out &= (above[0] >= 0) | (above[1] >= 0)
+        return out
+
+    def _seen(self, edges: np.ndarray, shares: np.ndarray, antennas: list[np.ndarray]) -> np.ndarray:
+        """Whether antennas, m (n, 3) each, all see points on edges (n,) at shares of their lengths: (n,)."""
+        places = self.pieces.places(edges, shares) + self._out[edges]
+        seen = np.ones(len(edges), bool)
         for antenna in antennas:
-            left = np.flatnonzero(seen)
-            hidden = self.rays.any_hit(places[left], np.broadcast_to(antenna, (len(left), 3)))
-            seen[left[hidden]] = False
+            rows = np.flatnonzero(seen)
+            seen[rows] = ~self.rays.any_hit(places[rows], antenna[rows])
         return seen
 
 

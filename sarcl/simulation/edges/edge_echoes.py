@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,31 +11,39 @@ import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.stage_timer import Clock
+from ...base.vectors import unit
 from ...numerics.polynomials import chebyshev, lagrange
-from ...numerics.pulse_geometry import half_path
 from ...opencl.device import Device
+from ...scattering.edge_diffraction import edge_matrix
 from ...scattering.subdivision import cell_edge
 from ...scene.scene import Scene
 from ..echo_request import EchoRequest
 from ..scene_plan import EDGES, SeenScene
 from ..spreading import ChannelView, Counts
-from ._edge_pieces import EdgeLight, EdgePieces, edge_pieces, longest_piece
+from ._edge_pieces import EdgeKnots, EdgeLight, EdgePieces, edge_pieces, longest_piece
 
 # Errors of amplitudes that are interpolated over the band between 1, 2, ... frequencies, x^m/(m! 2^(m - 1)), where
 # x = pi/8 for pieces of a quarter of a resolution cell
 OVER_BAND = tuple((math.pi / 8) ** m / (math.factorial(m) * 2 ** (m - 1)) for m in range(1, 16))
 PER_SIZE = 64  # pieces over the size of a scene with shadows, at least: these are looked for at the ends of pieces
-STEP = 32  # samples: phasors of so many next to one another are products of two factors
+# Samples: phasors of so many next to one another are products of two factors. Matrices of so many rows and columns are
+# multiplied: for larger ones OpenBLAS starts threads, which mostly wait for one another
+STEP = 32
+STEEP = 16.0  # change of coefficients over that of directions, rad, at most: near grazing incidence they change fastest
+TOGETHER = 2**16  # pairs of pulse and piece that are looked at together: 3 MB for each vector of them
+AMPLITUDES = 2**21  # of pairs, polarisations and frequencies, complex128, that are held together: 32 MB
 
 
 @dataclass(frozen=True, eq=False)
 class PreparedEdges:
     """Edges of a scene, prepared for all channels.
 
+    knots  where the coefficients of edges are computed
     light  what antennas see of the pieces; None: all of them;  error  of the echoes of edges, relative to their norm
     """
 
     pieces: EdgePieces
+    knots: EdgeKnots
     light: EdgeLight | None
     error: float
 
@@ -52,29 +60,61 @@ class PreparedEdges:
         gaps = [np.maximum(np.maximum(low - end, end - high), 0) for end in antennas.ends]
         near = min(float(np.linalg.norm(gap, axis=1).min()) for gap in gaps) - seen.margin
         wavelength = SPEED_OF_LIGHT / (waveform.center + waveform.bandwidth / 2)
-        longest = longest_piece(wavelength, cell_edge(waveform), max(near, wavelength), error / 4)
+        near = max(near, wavelength)
+        longest = longest_piece(wavelength, cell_edge(waveform), near, error / 4)
         device = request.device if request.shadows else None
-        return cls.pieces_of(seen.scene, request.crease, longest, device, error)
+        return cls.pieces_of(seen.scene, request.crease, longest, device, error, distance=near)
 
     @classmethod
     def pieces_of(
-        cls, scene: Scene, crease: float, longest: float, device: Device | None, error: float
+        cls,
+        scene: Scene,
+        crease: float,
+        longest: float,
+        device: Device | None,
+        error: float,
+        *,
+        distance: float = np.inf,
     ) -> PreparedEdges:
-        """The edges of a scene in pieces no longer than `longest`, m; device  that looks for shadows, None: nothing
-        shades."""
+        """The edges of a scene in pieces no longer than `longest`, m.
+
+        device  that looks for shadows, None: nothing shades;  distance  m, of the nearest antenna
+        """
         size = float(np.linalg.norm(np.diff(scene.bounds, axis=0)))
         pieces = edge_pieces(scene, crease, longest if device is None else min(longest, size / PER_SIZE))
         light = None if device is None or not len(pieces) else EdgeLight(pieces, device, scene)
-        return cls(pieces, light, error)
+        return cls(pieces, EdgeKnots.of(pieces, distance, error / STEEP), light, error)
+
+
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """What pulses see of pieces of edges: pairs of both, pulse by pulse.
+
+    pulse, piece  numbers of each pair, that of the pulse among those at hand (k,)
+    amplitudes    complex128 (k, n_polarizations, m) at m frequencies, |a|^2 in m^2
+    delays        s, about those of the pulses' reference ranges (k,);  counts  of all pairs
+    """
+
+    pulse: np.ndarray
+    piece: np.ndarray
+    amplitudes: np.ndarray
+    delays: np.ndarray
+    counts: Counts
+
+    def rows(self, n_pulses: int) -> Iterator[tuple[int, slice]]:
+        """Pulses that see something, and their pairs."""
+        ends = np.searchsorted(self.pulse, np.arange(n_pulses + 1)).tolist()
+        return ((p, slice(ends[p], ends[p + 1])) for p in range(n_pulses) if ends[p] < ends[p + 1])
 
 
 class EdgeEchoes:
     """Edges of one channel at one receiver."""
 
     def __init__(self, edges: PreparedEdges, view: ChannelView) -> None:
-        self.pieces, self.light, self.view = edges.pieces, edges.light, view
+        self.pieces, self.knots, self.light, self.view = edges.pieces, edges.knots, edges.light, view
         # pieces mostly cancel: an edge sends back as much as a wavelength of it, unless it is seen at right angles
-        gain = 1 + 2 * np.pi * float(view.frequencies[-1]) / SPEED_OF_LIGHT * edges.pieces.longest_edge
+        longest = float(edges.pieces.lengths.max(initial=0.0))
+        gain = 1 + 2 * np.pi * float(view.frequencies[-1]) / SPEED_OF_LIGHT * longest
         fine = [m for m, error in enumerate(OVER_BAND, 1) if error <= edges.error / gain]
         self.n_nodes = min(fine, default=len(OVER_BAND))
 
@@ -84,7 +124,7 @@ class EdgeEchoes:
     def describe(self) -> dict[str, Any]:
         """Words and numbers for a report."""
         left_out = {"edges left out": self.pieces.n_other} if self.pieces.n_other else {}
-        return {"edges": self.pieces.n_edges, "pieces of edges": len(self.pieces)} | left_out
+        return {"edges": len(self.pieces.ends), "pieces of edges": len(self.pieces)} | left_out
 
     def add(
         self, samples: np.ndarray, pulses: Sequence[int], clock: Clock, on_progress: Callable[[int], object]
@@ -93,62 +133,138 @@ class EdgeEchoes:
 
         on_progress is called with the number of pairs of piece and pulse that are done.
         """
-        counts = Counts()
-        for row, p in enumerate(pulses):
-            values, _, done = self.samples(p, self.view.frequencies)
-            samples[row] += values.astype(np.complex64)
-            counts += done
+        counts, every, f = Counts(), np.array(pulses), self.view.frequencies
+        exact = len(f) <= self.n_nodes
+        nodes = f if exact else chebyshev(float(f.mean()), float(np.ptp(f)), self.n_nodes)
+        for batch in self._batches(len(every), len(nodes)):
+            seen = self._seen(every[batch], nodes)
+            for p, rows in seen.rows(batch.stop - batch.start):
+                a, delays = seen.amplitudes[rows], seen.delays[rows]
+                if exact:
+                    out = np.einsum("kpm,km->pm", a, _phasors(delays, f))
+                else:
+                    sums = _summed(a.reshape(len(a), -1), delays, f).reshape(a.shape[1], len(nodes), len(f))
+                    out = np.einsum("pmn,mn->pn", sums, lagrange(nodes, f))
+                samples[batch.start + p] += out.astype(np.complex64)
+            counts += seen.counts
             on_progress(counts.pairs)
         clock.lap("edges")
         return counts
 
-    def samples(
-        self, pulse: int, frequencies: np.ndarray, *, exact: bool = False
-    ) -> tuple[np.ndarray, np.ndarray, Counts]:
-        """Samples (n_polarizations, n) of a pulse, their power at random phases, and counts of pairs.
+    def exactly(self, pulses: np.ndarray, frequencies: np.ndarray) -> Iterator[tuple[slice, np.ndarray, np.ndarray]]:
+        """Samples of batches of pulses (n,) at any frequencies, Hz: which these are, values complex128
+        (n, n_polarizations, m), and their power at random phases."""
+        for batch in self._batches(len(pulses), len(frequencies)):
+            seen = self._seen(pulses[batch], frequencies)
+            values = np.zeros((batch.stop - batch.start, *seen.amplitudes.shape[1:]), np.complex128)
+            powers = np.zeros(values.shape)
+            waves = seen.amplitudes * _phasors(seen.delays, frequencies)[:, None]
+            for p, rows in seen.rows(len(values)):
+                values[p] = waves[rows].sum(axis=0)
+                powers[p] = (np.abs(waves[rows]) ** 2).sum(axis=0)
+            yield batch, values, powers
 
-        frequencies  Hz (n,), evenly spaced;  exact  any: amplitudes are computed at each of them
+    def _batches(self, n_pulses: int, n_frequencies: int) -> Iterator[slice]:
+        if not len(self):
+            return iter(())
+        held = len(self) * n_frequencies * len(self.view.polarizations)
+        n = max(min(TOGETHER // len(self), AMPLITUDES // held), 1)
+        return (slice(first, min(first + n, n_pulses)) for first in range(0, n_pulses, n))
+
+    def _seen(self, pulses: np.ndarray, frequencies: np.ndarray) -> _Seen:
+        """What pulses (n,) see, at frequencies, Hz (m,).
+
+        a = F L integral exp(j psi (s - 1/2)) ds over the lit part, where psi is k times the difference of the paths
+        over both ends: phases meet from piece to piece, so that errors of their curvature are not added up along an
+        edge. F is that of the middle of the lit part, between knots.
         """
         antennas, pieces, view = self.view.antennas, self.pieces, self.view
-        ends = [antennas.tx[pulse], antennas.rx[pulse]]
-        away = half_path(ends[0], ends[1], pieces.centers) - antennas.reference_range[pulse]
-        inside = (away >= antennas.near[pulse]) & (away <= antennas.far[pulse]) | np.bool_(not view.gated)
-        lit = np.tile([0.0, 1.0], (len(pieces), 1)) if self.light is None else self.light.lit(ends)
-        seen = np.flatnonzero(inside & (lit[:, 1] > lit[:, 0]))
-        counts = Counts(len(pieces), int((~inside).sum()), int(inside.sum()) - len(seen))
-        if not len(seen):
-            nothing = np.zeros((len(view.polarizations), len(frequencies)))
-            return nothing.astype(np.complex128), nothing, counts
-        exact = exact or len(frequencies) <= self.n_nodes
-        nodes = frequencies if exact else chebyshev(float(frequencies.mean()), float(np.ptp(frequencies)), self.n_nodes)
-        chosen, waves = pieces.chosen(seen), 2 * np.pi * nodes / SPEED_OF_LIGHT
-        amplitudes, ranges = chosen.amplitudes(antennas, pulse, lit[seen], waves, view.polarizations, view.vertical)
-        delay = 2 * ranges / np.longdouble(SPEED_OF_LIGHT)
-        for m, f in enumerate(nodes.tolist()):
-            amplitudes[:, :, m] *= view.weights.weights(chosen.centers, pulse, f)[:, None]
-        if exact:
-            out = np.einsum("kpm,km->pm", amplitudes, _phasors(delay, frequencies))
-        else:
-            sums = _summed(amplitudes.reshape(len(seen), len(view.polarizations) * len(nodes)), delay, frequencies)
-            out = np.einsum("pmn,mn->pn", sums.reshape(-1, len(nodes), len(frequencies)), lagrange(nodes, frequencies))
-        power = (np.abs(amplitudes) ** 2).sum(axis=0)
-        return out, power if exact else power @ np.abs(lagrange(nodes, frequencies)), counts
+        ends = [antennas.tx[pulses]] if antennas.is_monostatic else [antennas.tx[pulses], antennas.rx[pulses]]
+        paths = _paths(ends, pieces.corners, antennas.reference_range[pulses])
+        begin, end = paths[:, pieces.first], paths[:, pieces.first + 1]
+        away = (begin + end) / 2
+        near, far = antennas.near[pulses, None], antennas.far[pulses, None]
+        inside = (away >= near) & (away <= far) if view.gated else np.ones(away.shape, bool)
+        lit = np.broadcast_to([0.0, 1.0], (*away.shape, 2)) if self.light is None else self.light.lit(ends)
+        pulse, piece = np.nonzero(inside & (lit[..., 1] > lit[..., 0]))
+        counts = Counts(inside.size, int((~inside).sum()), int(inside.sum()) - len(pulse))
+        lit, edge = lit[pulse, piece], pieces.edge[piece]
+        part, middle = lit[:, 1] - lit[:, 0], lit.sum(axis=1) / 2
+        share = pieces.corner_share[pieces.first[piece]] + middle / pieces.parts[edge]
+        scale = pieces.factor[edge] * pieces.lengths[edge] / pieces.parts[edge] * part
+        matrix = self._matrix(ends, pulse, edge, share) * scale[:, None]
+        phase = 2 * np.pi / SPEED_OF_LIGHT * frequencies * (2 * (begin - end)[pulse, piece])[:, None]
+        line = np.sinc(phase * part[:, None] / (2 * np.pi)).astype(complex)
+        cut = part < 1
+        line[cut] *= np.exp(1j * phase[cut] * (middle[cut] - 0.5)[:, None])
+        if view.weights.is_needed:
+            self._weigh(line, pulses, pulse, piece, frequencies)
+        return _Seen(pulse, piece, matrix[..., None] * line[:, None], 2 / SPEED_OF_LIGHT * away[pulse, piece], counts)
+
+    def _matrix(self, ends: list[np.ndarray], pulse: np.ndarray, edge: np.ndarray, share: np.ndarray) -> np.ndarray:
+        """a/dl, complex128 (k, n_polarizations), of pairs of pulse and edge (k,) at shares of its length (k,)."""
+        pieces, knots, view = self.pieces, self.knots, self.view
+        used = np.zeros((len(ends[0]), len(pieces.ends)), bool)
+        used[pulse, edge] = True
+        at, knot = np.nonzero(used[:, knots.edge])
+        number = np.zeros((len(used), len(knots.edge)), int)
+        number[at, knot] = np.arange(len(at))
+        looks = [unit(places[at] - knots.places[knot]) for places in ends]
+        up = (float(view.vertical[0]), float(view.vertical[1]), float(view.vertical[2]))
+        matrices = edge_matrix(pieces.shapes(knots.edge[knot]), looks[0], looks[-1], up)
+        columns = [("HV".index(name[0]), "HV".index(name[1])) for name in view.polarizations]
+        values = np.stack([matrices[:, r, t] for r, t in columns], axis=1)
+        before, after, weight = knots.around(edge, share)
+        first, second = values[number[pulse, before]], values[number[pulse, after]]
+        return np.asarray(first + weight[:, None] * (second - first))
+
+    def _weigh(
+        self, line: np.ndarray, pulses: np.ndarray, pulse: np.ndarray, piece: np.ndarray, frequencies: np.ndarray
+    ) -> None:
+        """Multiply amplitudes (k, m) of pairs by the weights of antennas."""
+        centers = (self.pieces.corners[self.pieces.first] + self.pieces.corners[self.pieces.first + 1]) / 2
+        for p in np.unique(pulse).tolist():
+            rows = np.flatnonzero(pulse == p)
+            for m, f in enumerate(frequencies.tolist()):
+                line[rows, m] *= self.view.weights.weights(centers[piece[rows]], int(pulses[p]), f)
 
 
-def _summed(amplitudes: np.ndarray, delay: np.ndarray, frequencies: np.ndarray) -> np.ndarray:
+def _paths(ends: list[np.ndarray], points: np.ndarray, reference: np.ndarray) -> np.ndarray:
+    """Half the paths over points, m (n, 3), about reference ranges (m,), m (m, n), to the rounding of float64 times the
+    distance of the points from one another: |t - x| = |t - c| + d.(d - 2 (t - c))/(|t - x| + |t - c|), d = x - c."""
+    center = points.mean(axis=0)
+    step, out = points - center, np.zeros((len(reference), len(points)))
+    middle = np.zeros(len(reference), np.longdouble)
+    for end in ends:
+        to = end - center
+        distance = np.sqrt((to.astype(np.longdouble) ** 2).sum(axis=1))
+        middle += distance / len(ends)
+        change = (step**2).sum(axis=1) - 2 * to @ step.T
+        short = distance.astype(np.float64)[:, None]
+        out += change / (np.sqrt(np.maximum(short**2 + change, 0)) + short) / len(ends)
+    return np.asarray(out + (middle - reference).astype(np.float64)[:, None])
+
+
+def _summed(amplitudes: np.ndarray, delays: np.ndarray, frequencies: np.ndarray) -> np.ndarray:
     """sum_k a_k exp(-2 pi j f tau_k) at n evenly spaced frequencies, complex128 (m, n), of m columns of amplitudes.
 
-    amplitudes  (k, m);  delay  s, longdouble (k,)
+    amplitudes  (k, m);  delays  s (k,)
     """
-    n, first = len(frequencies), np.longdouble(frequencies[0])
-    step = np.longdouble(frequencies[-1] - frequencies[0]) / max(n - 1, 1)
-    rows = -(-n // STEP)
-    coarse = _phasors(delay, first + step * STEP * np.arange(rows))
-    fine = _phasors(delay, step * np.arange(min(STEP, n)))
-    columns = (amplitudes[:, :, None] * coarse[:, None]).reshape(len(delay), -1)
-    return np.asarray((columns.T @ fine).reshape(amplitudes.shape[1], -1)[:, :n])
+    n, first = len(frequencies), float(frequencies[0])
+    step = (float(frequencies[-1]) - first) / max(n - 1, 1)
+    fine = np.ones((-(-len(delays) // STEP) * STEP, STEP), complex)
+    k = len(delays)
+    for i in range(STEP.bit_length() - 1):
+        fine[:k, 2**i : 2 ** (i + 1)] = fine[:k, : 2**i] * _phasors(delays, np.array([step * 2**i]))
+    coarse = _phasors(delays, first + step * STEP * np.arange(-(-n // STEP)))
+    columns = np.zeros((len(fine), amplitudes.shape[1] * coarse.shape[1]), complex)
+    columns[:k] = (amplitudes[:, :, None] * coarse[:, None]).reshape(k, -1)
+    blocks = columns.reshape(-1, STEP, columns.shape[1]).transpose(0, 2, 1)
+    parts = [blocks[:, c : c + STEP] @ fine.reshape(-1, STEP, STEP) for c in range(0, columns.shape[1], STEP)]
+    sums = np.concatenate([part.sum(axis=0) for part in parts])
+    return np.asarray(sums.reshape(amplitudes.shape[1], -1)[:, :n])
 
 
-def _phasors(delay: np.ndarray, frequencies: np.ndarray) -> np.ndarray:
-    cycles = delay[:, None] * frequencies
-    return np.asarray(np.exp(-2j * np.pi * (cycles - np.rint(cycles)).astype(np.float64)))
+def _phasors(delays: np.ndarray, frequencies: np.ndarray) -> np.ndarray:
+    cycles = delays[:, None] * frequencies
+    return np.asarray(np.exp(-2j * np.pi * (cycles - np.rint(cycles))))

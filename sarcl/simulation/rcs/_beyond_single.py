@@ -79,8 +79,8 @@ def add_beyond_single_reflections(task: RcsTask, out: np.ndarray) -> None:
     share = SHARE * options.tolerance
     if options.edges:
         edges = EdgeEchoes(PreparedEdges.pieces_of(scene, options.crease, np.inf, task.shading_device, share), view)
-        for p in range(len(tx)):
-            out[p] += edges.samples(p, task.frequencies, exact=True)[0].T
+        for rows, values, _ in edges.exactly(np.arange(len(tx)), task.frequencies):
+            out[rows] += values.transpose(0, 2, 1)
     bounced = BounceScene.of(scene, options.bounces, share)
     if bounced is not None:
         for rows, values in BounceSpreader(bounced, view).exactly(np.arange(len(tx)), task.frequencies):
