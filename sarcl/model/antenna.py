@@ -198,6 +198,13 @@ class Antenna:
         """Amplitude gain at the peak, 10^(gain_db/20)."""
         return float(10 ** (self.gain_db / 20))
 
+    @property
+    def has_root(self) -> bool:
+        """Whether a two-way pattern is real and nowhere negative: the square of one that sends and receives alike."""
+        if self.kind == "table":
+            return bool((self.values.real >= 0).all() and not self.values.imag.any())
+        return self.kind != "aperture"
+
     def axes(self, track: Trajectory) -> NDArray[np.float64]:
         """Antenna axes in the scene at every pulse, as columns, (n, 3, 3): track.attitude @ mount.
 

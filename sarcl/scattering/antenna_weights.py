@@ -139,16 +139,36 @@ class AntennaWeights:
 
     def weights(self, points: np.ndarray, pulse: int, frequency: float) -> np.ndarray:
         """Weights (n,), complex128, of points, m (n, 3), at one pulse: the reference of kernels/gains.clh."""
-        return self.of_paths(points - self.geometry.tx[pulse], points - self.geometry.rx[pulse], pulse, frequency)
+        sent, received = points - self.geometry.tx[pulse], points - self.geometry.rx[pulse]
+        return self._weighted(self.pair or (None, None), sent, received, pulse, frequency)
 
     def of_paths(self, sent: np.ndarray, received: np.ndarray, pulse: int, frequency: float) -> np.ndarray:
         """Weights (n,), complex128, of paths at one pulse: vectors m (n, 3) along which a wave leaves the transmitter,
-        as long as its way to the last scatterer, and from the receiver to that scatterer."""
+        as long as its way to the last scatterer, and from the receiver to that scatterer.
+
+        A two-way pattern G is that of an antenna with the gain sqrt(G) each way: see Antenna.has_root.
+        """
+        both = self.pair or (None, None)
+        if both[0] is None or both[1] is not None:
+            return self._weighted(both, sent, received, pulse, frequency)
+        squares = [self._weighted(both, way, way, pulse, frequency).real for way in (sent, received)]
+        # splines of tables may pass below 0 between their values
+        return np.prod([np.sqrt(np.maximum(one, 0)) for one in squares], axis=0).astype(np.complex128)
+
+    def _weighted(
+        self,
+        pair: Sequence[Antenna | None],
+        sent: np.ndarray,
+        received: np.ndarray,
+        pulse: int,
+        frequency: float,
+    ) -> np.ndarray:
+        """Gains of a pair of patterns, 1 where one is None, times the spreading loss: see `of_paths`."""
         from ..model.antenna_pattern import pattern_gain
 
         out = np.ones(len(sent), np.complex128)
-        if self.pair is not None and self.axes is not None:
-            for one, way, axes in zip(self.pair, (sent, received), self.axes, strict=True):
+        if self.axes is not None:
+            for one, way, axes in zip(pair, (sent, received), self.axes, strict=True):
                 out *= 1 if one is None else pattern_gain(one, way @ axes[pulse], frequency)
         if self.radar is not None:
             out *= self.range**2 * spreading(*(np.linalg.norm(way, axis=1) for way in (sent, received)))

@@ -132,15 +132,12 @@ def _check_bounces(options: EchoOptions) -> None:
         raise ValueError(
             f"{several} with shadows=False; what reflects to another facet also shades it: give shadows=True"
         )
-    if options.array is not None:
-        raise ValueError(
-            f"{several} with an array; several reflections are computed for one antenna or a pair: give bounces=1"
-        )
     antennas = options.antenna if isinstance(options.antenna, (tuple, list)) else (options.antenna,)
-    if any(isinstance(one, Antenna) and one.two_way for one in antennas):
+    if any(isinstance(one, Antenna) and one.two_way and not one.has_root for one in antennas):
         raise ValueError(
-            f"{several} with a two-way pattern; waves leave and arrive in different directions after several "
-            "reflections: give the pattern of one way"
+            f"{several} with a two-way pattern that is negative or complex somewhere; waves leave and arrive in "
+            "different directions after several reflections, and such a pattern does not say which gain each has: give "
+            "the pattern of one way, without two_way=True"
         )
 
 

@@ -81,6 +81,7 @@ class ArrayChannels:
         shared = not layout.rows.separated or layout.grid.holds([c.carrier for c in layout.sent])
         if (
             request.crease is not None
+            or request.bounces > 1  # shadows of edges and of bounced beams end abruptly from element to element
             or INTERPOLATED not in request.skips
             or layout.runs <= len(layout.rows.track)
             or not shared

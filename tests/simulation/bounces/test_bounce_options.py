@@ -13,6 +13,7 @@ TRACK = sarcl.Trajectory.line(start=(1e3, 998, 1e3), velocity=(0, 1, 0), prf=1.0
 CORNER = np.array(
     [[(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 0, 0), (0, 1, 0), (0, 0, 1)], [(0, 0, 0), (0, 0, 1), (1, 0, 0)]], float
 )
+ANGLES = np.linspace(-0.5, 0.5, 5)
 SCENE = sarcl.Scene.facets(CORNER)
 
 
@@ -30,7 +31,8 @@ def test_other_numbers_of_reflections_are_refused(bounces):
     ("options", "text"),
     [
         ({"shadows": False}, "shadows=True"),
-        ({"array": sarcl.AntennaArray.linear(2, spacing=0.1, frequency_step=0.0)}, "array"),
+        ({"antenna": sarcl.Antenna.rectangular(size=(0.1, 0.1), two_way=True)}, "without two_way=True"),
+        ({"antenna": sarcl.Antenna.table(ANGLES, ANGLES, 1j * np.ones((5, 5)), two_way=True)}, "complex somewhere"),
     ],
 )
 def test_what_does_not_go_with_several_reflections_is_refused_by_name(options, text):
