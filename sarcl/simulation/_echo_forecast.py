@@ -30,7 +30,7 @@ from .echo_task import EchoTask
 from .factorized.spreader import FactorizedSpreader
 from .scene_echoes import Added, SceneEchoes
 from .scene_plan import EDGES, SHADOWS, ScenePlan, parts_of, samples_shadows
-from .scene_preparation import warn_of_curves
+from .scene_preparation import warn_of_shapes
 from .spectral.spectral_task import spectral_task
 
 TIMED_SHARE, LEAST_TIMED = 0.02, 4e-3  # of the modelled job, and seconds, of pulses that are timed
@@ -70,7 +70,7 @@ def forecast_of(
     else:
         known = planned.scene.describe() | ({"facets": round(work.pieces)} if work.pieces else {})
         if 1e-6 * cost_model.JUDGED_FACET * len(planned.scene.seen.original.triangles) <= JUDGING * work.seconds:
-            known |= warn_of_curves(planned.scene)
+            known |= warn_of_shapes(planned.scene)
         clock.lap("plan")
         estimate = Estimate(_allotted(planned), known, work.seconds, work.contributions)
     spent = sum(clock.seconds.values())

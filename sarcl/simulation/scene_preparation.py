@@ -8,10 +8,15 @@ from typing import Any
 from ..base.errors import NothingSeen, ToleranceUnreachable, warn
 from ..base.report import ErrorTerm
 from ..base.tolerances import askable, rounded_up
+from ..scattering import facing_corners
 from ..scattering.antenna_weights import AntennaWeights
 from ..scattering.facet_shadows import ShadowRule
 from ..scattering.facets import FacetSet
+from ..scattering.facing_corners import FacingCorners
 from ..scattering.mesh_quality import facet_error, post_spacing, speckle_contrast
+from ..scattering.mesh_quality.facet_error import FacetError
+from ..scattering.mesh_quality.post_spacing import PostSpacing
+from ..scattering.mesh_quality.speckle_contrast import Speckle
 from ..scattering.rough_pieces import PIECE_BYTES, RoughFacets
 from ..scattering.scatterers import Points, facets_of, points_of
 from ..scattering.subdivision import Subdivision
@@ -63,7 +68,7 @@ def _prepared(plan: ScenePlan, *, tiled: bool, exact: bool) -> SceneEchoes:
         cells, represents = cut.sampled_cells(speckle_contrast.SAMPLED)
         # curves are recognised in facets as they were given, speckle follows from the facets that are added up
         speckle = speckle_contrast.judge(cells, seen.antennas, seen.waveform, represents)
-        mesh_warnings = warn_of_curves(plan) | _warned(speckle)
+        mesh_warnings = warn_of_shapes(plan) | _warned(speckle)
         request.report("scene", 1, 3)
         shadows = ShadowRule(
             exact=exact,
@@ -168,16 +173,20 @@ def _shadow_terms(request: EchoRequest, scene: Scene, facets: Sequence[FacetSet]
     )
 
 
-def warn_of_curves(plan: ScenePlan) -> dict[str, Any]:
-    """Warn of posts and facets too large for what they stand for; returns what a report says of them."""
+def warn_of_shapes(plan: ScenePlan) -> dict[str, Any]:
+    """Warn of posts and facets too large for what they stand for, and of right angles whose reflections are not
+    followed; returns what a report says of them."""
     if plan.subdivision is None:
         return {}
     seen = plan.seen
     _warned(post_spacing.judge(seen.original, seen.antennas, seen.waveform))
-    return _warned(facet_error.judge(seen.original, seen.antennas, seen.waveform))
+    words = _warned(facet_error.judge(seen.original, seen.antennas, seen.waveform))
+    if plan.request.bounces > 1:
+        return words
+    return words | _warned(facing_corners.judge(seen.original, seen.antennas, seen.waveform))
 
 
-def _warned(judgement: facet_error.FacetError | post_spacing.PostSpacing | speckle_contrast.Speckle) -> dict[str, Any]:
+def _warned(judgement: FacetError | PostSpacing | Speckle | FacingCorners) -> dict[str, Any]:
     for number, text in enumerate(judgement.warnings()):
         warn(text, f"{type(judgement).__name__} {number}")
     return judgement.describe()
