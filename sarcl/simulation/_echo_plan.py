@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ..arrays.channels import is_single
-from ..base.errors import confirm_tolerance, warned_once
+from ..base.errors import confirm_tolerance, warn, warned_once
 from ..base.forecast import Forecast
 from ..base.report import Report
 from ..base.stage_timer import Clock
@@ -22,10 +22,12 @@ from ._single_channel import SingleChannel
 from .channels.array_channels import ArrayChannels
 from .echo_check import worth_checking
 from .echo_files import EchoFiles
+from .echo_options import EchoOptions
 from .echo_output import EchoOutput
 from .echo_request import EchoRequest
 from .echo_task import EchoTask
 from .scene_echoes import Added, SceneEchoes
+from .spreading import Counts
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,6 +139,7 @@ class EchoPlan:
         plan = channels.words(planned.method, added.plan)  # type: ignore[arg-type]
         if prepared.bounced is not None:
             plan["contributions by reflections"] = added.counts.by_order()
+            plan |= _late_words(added.counts, options)
         if n_kept:
             plan["from files"] = f"{n_kept} of {len(output)} pulses"
         report = Report(
@@ -153,3 +156,19 @@ class EchoPlan:
         compressed, waveform = options.compressed, self.task.waveform
         own = {"waveform": waveform, "array": options.array, "compressed": compressed, "report": report}
         return {**channels.fields(), **own}
+
+
+def _late_words(counts: Counts, options: EchoOptions) -> dict[str, str]:
+    """What a report says of echoes of several reflections outside the range window; warns where they are stronger than
+    the tolerance, and nobody asked for that window."""
+    share = counts.late_share
+    if not share:
+        return {}
+    if options.range_window is None and share > options.tolerance**2:
+        warn(
+            f"echoes of several reflections arrive outside the range window, with {100 * share:.2g} % of the power: up "
+            f"to {counts.latest:.1f} m behind the reference; pass range_window=({-counts.latest:.0f}, "
+            f"{1.05 * counts.latest:.0f})",
+            "late echoes",
+        )
+    return {"late echoes outside the range window": f"{100 * share:.2g} % of the power, up to {counts.latest:.1f} m"}

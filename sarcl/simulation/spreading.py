@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
@@ -42,6 +43,8 @@ class Counts:
     outside_beam    beyond the limits of an antenna's beam
     unseen          pairs of a beam and a facet that it does not reach, or that the receiver does not see
     orders          beams of 1, 2 ... reflections that contributed, where several are followed
+    late, power     mean |sample|^2, less the pulse's spectrum, of beams outside the range window, and of all samples
+    latest          m about the reference: the latest of such beams
     """
 
     pairs: int = 0
@@ -50,6 +53,9 @@ class Counts:
     outside_beam: int = 0
     unseen: int = 0
     orders: tuple[int, ...] = ()
+    late: float = 0.0
+    power: float = 0.0
+    latest: float = -math.inf
 
     def __add__(self, other: Counts) -> Counts:
         return Counts(
@@ -59,12 +65,20 @@ class Counts:
             self.outside_beam + other.outside_beam,
             self.unseen + other.unseen,
             tuple(map(sum, zip_longest(self.orders, other.orders, fillvalue=0))),
+            self.late + other.late,
+            self.power + other.power,
+            max(self.latest, other.latest),
         )
 
     @property
     def contributing(self) -> int:
         """Pairs that were added up."""
         return self.pairs - self.outside_window - self.facing_away - self.outside_beam - self.unseen
+
+    @property
+    def late_share(self) -> float:
+        """Share of the power that beams outside the range window have, 0 to 1."""
+        return self.late / (self.late + self.power) if self.late else 0.0
 
     def by_order(self) -> str:
         """Contributions of 1, 2 ... reflections, for a report."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -105,7 +105,7 @@ class BounceSpreader:
         for rows in self._blocks(numbers):
             values, part = self.values(numbers[rows], self.view.frequencies)
             samples[rows] += values.astype(np.complex64)
-            counts += part
+            counts += replace(part, power=float((np.abs(samples[rows]) ** 2).sum() / samples.shape[-1]))
             on_progress(counts.pairs)
         clock.lap("bounces")
         return counts
@@ -138,16 +138,19 @@ class BounceSpreader:
             (a, counts), (b, more) = (self.values(p, frequencies, exact=exact) for p in (pulses[:half], pulses[half:]))
             return np.concatenate([a, b]), counts + more
         for beams, pieces, of, n_pairs in self._lit_beams(_beams.first(surfaces, tx, facets), rx, turn):
-            outside, seen = 0, np.bincount(of, minlength=len(beams)) > 0
+            outside, late, latest, seen = 0, 0.0, -np.inf, np.bincount(of, minlength=len(beams)) > 0
             if len(of):
                 triangles = self._facets(beams, pieces, of, rx)
                 inside = self._inside(triangles, pulses)
                 outside = int(seen.sum()) - len(np.unique(triangles.of[inside]))
                 self._add(out, pulses, frequencies, triangles.chosen(inside), exact)
+                if outside:
+                    late, latest = self._late(triangles, np.setdiff1d(triangles.of, triangles.of[inside]), pulses)
             done = int(seen.sum()) - outside
             counts += Counts(
-                n_pairs, outside, unseen=n_pairs - outside - done, orders=(0,) * (beams.order - 1) + (done,)
-            )
+                n_pairs, outside, unseen=n_pairs - outside - done, orders=(0,) * (beams.order - 1) + (done,),
+                late=late, latest=latest,
+            )  # fmt: skip
         return out, counts
 
     def _lit_beams(
@@ -206,6 +209,17 @@ class BounceSpreader:
         antennas, row = self.view.antennas, pulses[facets.beams.pulse]
         delta = facets.path / 2 - antennas.reference_range[row]
         return np.flatnonzero((delta >= antennas.near[row]) & (delta <= antennas.far[row]))
+
+    def _late(self, triangles: Facets, beams: np.ndarray, pulses: np.ndarray) -> tuple[float, float]:
+        """Power of beams of these numbers (n,) in a sample, and the latest half path about the reference, m."""
+        some = triangles.chosen(np.flatnonzero(np.isin(triangles.of, beams)))
+        delta = some.path / 2 - self.view.antennas.reference_range[pulses[some.beams.pulse]]
+        frequency = float(np.median(self.view.frequencies))
+        sent = some.shapes(np.array([frequency]), self._coatings) * self._weighted(some, pulses, frequency)
+        sent *= np.exp(-4j * np.pi * frequency / SPEED_OF_LIGHT * delta)[:, None]
+        sums = np.zeros((int(some.of.max()) + 1, sent.shape[1]), np.complex128)
+        np.add.at(sums, some.of, sent)
+        return float((np.abs(sums) ** 2).sum()), float(delta.max())
 
     def _add(self, out: np.ndarray, pulses: np.ndarray, frequencies: np.ndarray, facets: Facets, exact: bool) -> None:
         view, scene, coatings = self.view, self.scene, self._coatings

@@ -88,6 +88,25 @@ def test_echoes_outside_the_range_window_are_left_out_and_counted():
     assert part.report.contributions_skipped["range window"] > 0
 
 
+def test_echoes_later_than_the_default_window_are_warned_of_with_their_power():
+    """A plate that the radar sees at right angles in the ground: its image lies 10 m below, behind all of the scene."""
+    wave = sarcl.Waveform.chirp(center=9.6e9, bandwidth=600e6, duration=1e-6)
+    plate = sarcl.shapes.plate((1, 1), position=(-10, 0, 10), rotation=(0, -np.pi / 4, 0))
+    scene = plate + sarcl.shapes.plate((6, 6))
+    track = sarcl.Trajectory(None, np.array([[1e3, 0, 1e3]]))
+    options = {"bounces": 3, "tolerance": 1e-2, "check": False}
+    with pytest.warns(sarcl.SarclWarning, match=r"outside the range window, with .* % of the power") as caught:
+        short = sarcl.echo(scene, wave, track, **options)
+    far = float(str(caught[0].message).split(", ")[-1].rstrip(")"))
+    long = sarcl.echo(scene, wave, track, range_window=(-far, far), **options)  # no warning
+    behind = (np.array([10, 0, 10]) + scene.center) @ [1, 0, 1] / np.sqrt(2)
+    assert far == pytest.approx(1.05 * behind, abs=1.5)
+    words = str(short.report.plan["late echoes outside the range window"])
+    total, within = (np.mean(np.abs(raw.samples) ** 2) for raw in (long, short))
+    assert float(words.split(" %")[0]) / 100 == pytest.approx(1 - within / total, rel=0.1)
+    assert "late echoes outside the range window" not in long.report.plan
+
+
 def test_facets_without_coherent_part_shade_and_do_not_reflect_to_others():
     diffuse = sarcl.Scene.facets(CORNER, material=[0, 1, 1], materials=["metal", sarcl.Material(diagram="isotropic")])
     one, three = (echo(diffuse, bounces=n).samples for n in (1, 3))
