@@ -25,18 +25,22 @@ from ..model.phase_history import PhaseHistory
 from ..numerics import cost_model
 from ._planned_echoes import EchoWork, Method, PlannedEchoes
 from ._single_channel import SingleEchoes
+from .bounces.bounce_spreader import PULSES_AT_ONCE, BounceScene, BounceSpreader
 from .echo_output import bytes_of
 from .echo_task import EchoTask
+from .edges.edge_echoes import EdgeEchoes, PreparedEdges
 from .factorized.spreader import FactorizedSpreader
 from .scene_echoes import Added, SceneEchoes
 from .scene_plan import EDGES, SHADOWS, ScenePlan, parts_of, samples_shadows
 from .scene_preparation import warn_of_shapes
 from .spectral.spectral_task import spectral_task
+from .spreading import ChannelView
 
 TIMED_SHARE, LEAST_TIMED = 0.02, 4e-3  # of the modelled job, and seconds, of pulses that are timed
 SLOWER = 4.0  # over the modelled seconds: pulses that take longer have built kernels or waited; they are timed again
 MOST_PLANS = 64  # channels and receivers whose plans are made: of more, those of the pulses that are timed
 JUDGING = 0.02  # of the modelled job: meshes are judged, and warned of, where that takes no more
+FEW_SHARE, MOST_FEW = 16, 8  # of n pulses, n/16 and at most 8 are timed, of several reflections and of edges
 SPECTRAL_SHARE = 0.04  # of the modelled job: spectral_echo is planned where that takes no more
 
 
@@ -72,7 +76,7 @@ def forecast_of(
         if 1e-6 * cost_model.JUDGED_FACET * len(planned.scene.seen.original.triangles) <= JUDGING * work.seconds:
             known |= warn_of_shapes(planned.scene)
         clock.lap("plan")
-        estimate = Estimate(_allotted(planned), known, work.seconds, work.contributions)
+        estimate = Estimate(_allotted(planned), known, work.seconds + _beyond_single(planned), work.contributions)
     spent = sum(clock.seconds.values())
     seconds = spent + estimate.seconds / task.options.speedup(task.devices)
     words = planned.channels.words(planned.method, estimate.words)  # type: ignore[arg-type]
@@ -141,6 +145,33 @@ def _timed_pulses(scene: SceneEchoes, method: Method, shape: tuple[int, ...], wo
     if seconds > SLOWER * n * work.adding / n_pulses:
         seconds = min(seconds, timed(first)[0])
     return Estimate(added.error_terms, added.plan, seconds / n, added.counts.contributing / n)
+
+
+def _beyond_single(planned: PlannedEchoes) -> float:
+    """Seconds of several reflections and of edges, from those of a few pulses in the middle of the track."""
+    scene, n_samples = planned.scene, planned.channels.shape[-1]
+    request, seen, n = scene.request, scene.seen, len(scene.seen.antennas)
+    center, bandwidth = seen.waveform.center, seen.waveform.bandwidth
+    frequencies = center + bandwidth * ((np.arange(n_samples) + 0.5) / n_samples - 0.5)
+    view = ChannelView(
+        seen.antennas, seen.weights, frequencies, bandwidth, request.polarizations, request.vertical, request.gated
+    )
+    begin = time.perf_counter()
+    bounced, edges = BounceScene.of(seen.scene, request.bounces, scene.error_budget), PreparedEdges.of(request, seen)
+    spreaders: list[BounceSpreader | EdgeEchoes] = [] if bounced is None else [BounceSpreader(bounced, view)]
+    spreaders += [] if edges is None else [EdgeEchoes(edges, view)]
+    seconds = time.perf_counter() - begin
+    few = int(np.clip(n // FEW_SHARE, 2, MOST_FEW))
+    for spreader in spreaders:
+        took = []
+        for number in (1, 1, min(few, n)):  # the first call builds kernels and lists of facets
+            pulses, begin = range((n - number) // 2, (n + number) // 2), time.perf_counter()
+            spreader.add(np.zeros((number, len(request.polarizations), n_samples), np.complex64), pulses, Clock(), bool)
+            took.append(time.perf_counter() - begin)
+        pulse = np.clip((took[2] - took[1]) / (few - 1), 0, took[2] / few)
+        block = max(took[1] - pulse, 0.0)  # what pulses that are looked at together share
+        seconds += float(pulse + block / min(n, PULSES_AT_ONCE)) * planned.method.runs
+    return seconds
 
 
 def _allotted(planned: PlannedEchoes) -> tuple[ErrorTerm, ...]:

@@ -164,3 +164,22 @@ def test_a_forecast_times_other_pulses_only_where_nothing_is_seen(monkeypatch):
     monkeypatch.setattr(kind, "fill", unseen)
     assert sarcl.plan(sarcl.echo, points(), CHIRP, TRACK).plan["contributions"] == 0
     assert len(set(tried)) == 3
+
+
+@pytest.mark.parametrize("options", [{"bounces": 4}, {"edges": True}])
+def test_a_scene_that_is_not_prepared_has_the_seconds_of_reflections_and_edges(options, monkeypatch):
+    """By a clock of contributions: it stands still but for these, whose pairs it counts."""
+    from sarcl.simulation import _echo_forecast as forecasts
+
+    room = sarcl.shapes.plate((3, 3)) + sarcl.shapes.plate((3, 3), position=(0, 1.5, 1.5), rotation=(np.pi / 2, 0, 0))
+    kind = forecasts.BounceSpreader if "bounces" in options else forecasts.EdgeEchoes
+    clock, added = [0.0], kind.add
+
+    def add(self, samples, pulses, *others):
+        clock[0] += 2.0 + 0.5 * len(pulses)
+        return added(self, samples, pulses, *others)
+
+    monkeypatch.setattr(kind, "add", add)
+    monkeypatch.setattr(forecasts.time, "perf_counter", lambda: clock[0])
+    one, more = (forecast(UNPREPARED, room, CHIRP, TRACK, tolerance=0.1, **o) for o in ({}, options))
+    assert more.seconds - one.seconds == pytest.approx(0.5 * len(TRACK) + 2.0, abs=1.0)
