@@ -78,7 +78,7 @@ def diverse_factor(
 
     shape (N, P), spacing (dy, dz) m, frequency_step (dfy, dfz) Hz, cosines (ky, kz) and retarded s: (...), broadcast.
     """
-    f0 = validation.number("f0", f0, above=0)
+    f0 = validation.carrier("f0", f0)
     d = validation.array("spacing", spacing, np.float64, (2,))
     df = validation.array("frequency_step", frequency_step, np.float64, (2,))
     if not isinstance(cosines, (list, tuple, np.ndarray)) or len(cosines) != 2:

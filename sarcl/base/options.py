@@ -7,9 +7,9 @@ on the command line and its table in the guide are made from its record.
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import Field, dataclass, field, fields, replace
-from typing import Any
+from typing import Any, ClassVar
 
 Check = Callable[[str, Any], Any]
 _KEY = "option"  # of a field's metadata
@@ -40,7 +40,12 @@ def or_none(check: Check) -> Check:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Options:
-    """Base class of records of options: checks every field, in their order, when one is made."""
+    """Base class of records of options: checks every field, in their order, when one is made.
+
+    absent  options of other verbs that this one has not, and why: what an error says
+    """
+
+    absent: ClassVar[Mapping[str, str]] = {}
 
     def __post_init__(self) -> None:
         for name, (_, details) in described(type(self)).items():

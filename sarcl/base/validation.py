@@ -12,6 +12,7 @@ from .text import shown, size_text
 
 NUMBERS = SupportsComplex | SupportsFloat | SupportsIndex  # None is none of these; classes of numbers look like them
 LARGEST_TOLERANCE = 0.3  # relative error; noise of a tenth of the signal's power
+LOWEST_CARRIER, HIGHEST_CARRIER = 1e5, 1e13  # Hz: from long waves to far infrared
 LEAST_TOLERANCE = 1e-11  # relative error; a range of 1 km at 10 GHz, rounded to float64, has a phase error of 2e-11 rad
 
 
@@ -184,6 +185,26 @@ def number(name: str, value: Any, *, above: float | None = None, least: float | 
     if least is not None and not out >= least:
         raise ValueError(f"{name} is {out:g}; it must be at least {least:g}")
     return out
+
+
+def carrier(name: str, value: Any) -> float:
+    """`value` as a carrier frequency, Hz: LOWEST_CARRIER to HIGHEST_CARRIER."""
+    out = number(name, value, above=0)
+    carriers(name, np.array(out))
+    return out
+
+
+def carriers(name: str, value: np.ndarray) -> None:
+    """ValueError for frequencies that no radar has; the message names the unit that they are likely in."""
+    outside = (value < LOWEST_CARRIER) | (value > HIGHEST_CARRIER)
+    if not outside.any():
+        return
+    f = float(value[outside].flat[0])
+    units = [(unit, f * scale) for unit, scale in (("GHz", 1e9), ("MHz", 1e6)) if 0 < f < 1e12 / scale]
+    remedy = f"is it in {units[0][0]}? Give {units[0][1]:.4g}" if units else "was a unit counted twice?"
+    raise ValueError(
+        f"{name} is {f:g} Hz; carriers lie between {LOWEST_CARRIER:g} and {HIGHEST_CARRIER:g} Hz: {remedy}"
+    )
 
 
 def tolerance(value: object) -> float:

@@ -63,6 +63,8 @@ def verb(
             if len(args) > len(names):
                 raise TypeError(f"{plan.__name__} takes {', '.join(names)} by position; give options by name")
             for name in options_by_name:
+                if name in record.absent and name not in known:
+                    raise TypeError(f"{plan.__name__} has no option {name!r}: {record.absent[name]}")
                 if name not in known and name not in names:
                     raise TypeError(f"{plan.__name__} has {unknown(name, known, 'option')}")
             own = {name: options_by_name.pop(name) for name in names if name in options_by_name}

@@ -85,7 +85,7 @@ class Antenna:
             raise ValueError(f"antenna two_way is {self.two_way!r}; give True or False")
         self._set("mount", rotations("antenna mount", self.mount, ()))
         if self.frequency is not None:
-            self._set("frequency", validation.number("antenna frequency", self.frequency, above=0))
+            self._set("frequency", validation.carrier("antenna frequency", self.frequency))
         if self.kind == "aperture":
             if self.frequency is not None:
                 raise ValueError("an aperture's size in metres holds at every frequency; leave its frequency out")
@@ -226,7 +226,7 @@ class Antenna:
         from .antenna_pattern import pattern_gain
 
         directions = validation.vectors("directions", directions)
-        return pattern_gain(self, directions, validation.number("frequency", frequency, above=0))
+        return pattern_gain(self, directions, validation.carrier("frequency", frequency))
 
     def ratio(self, frequency: float | np.ndarray) -> float | np.ndarray:
         """Factor by which angles are multiplied before the pattern is evaluated."""

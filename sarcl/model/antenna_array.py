@@ -165,7 +165,7 @@ class AntennaArray:
         grouped = replace(self, offsets=self.offsets[:, first])
         if steer is None:
             return grouped
-        f = validation.number("frequency", frequency, above=0) + grouped.offsets[0]
+        f = validation.carrier("frequency", frequency) + grouped.offsets[0]
         if f.min() <= 0:
             raise ValueError(f"frequency {frequency:g} Hz gives a carrier of {f.min():g} Hz; carriers are above 0")
         along = (self.positions - self.positions[first]) @ _towards(steer)

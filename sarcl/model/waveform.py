@@ -50,7 +50,8 @@ class Waveform:
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        for name in ("center", "bandwidth", "duration"):
+        object.__setattr__(self, "center", validation.carrier("waveform center", self.center))
+        for name in ("bandwidth", "duration"):
             object.__setattr__(self, name, validation.number(f"waveform {name}", getattr(self, name), above=0))
         validation.choice("waveform kind", self.kind, ("chirp", "down-chirp", "tone", "sampled"))
         if self.bandwidth >= 2 * self.center:

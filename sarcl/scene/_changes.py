@@ -104,7 +104,7 @@ def at_frequency(scene: Scene, frequency: float) -> Scene:
 
     Scenes without apertures are returned as they are. ValueError for a frequency that is not greater than 0.
     """
-    frequency = validation.number("frequency", frequency, above=0)
+    frequency = validation.carrier("frequency", frequency)
     if not scene.apertures.any():
         return scene
     areas = scene.apertures

@@ -130,6 +130,7 @@ def _wavelength(frequency: ArrayLike) -> np.ndarray:
     validation.finite("frequency", f)
     if not (f > 0).all():
         raise ValueError(f"frequency reaches {f.min():g} Hz; it must be greater than 0")
+    validation.carriers("frequency", f)
     return np.asarray(SPEED_OF_LIGHT / f)
 
 

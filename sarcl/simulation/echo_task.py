@@ -21,6 +21,7 @@ from ..scene.scene import Scene
 from . import echo_sampling
 from .echo_options import EchoOptions
 from .echo_request import EchoRequest
+from .reflection_options import refuse_forward_with
 
 KEPT = 1 / 16  # of the memory for blocks, for results that a scene keeps for the next call
 
@@ -110,9 +111,7 @@ def refuse_hidden_by_sheets(scene: Scene) -> None:
 
 def refuse_forward(options: EchoOptions, scene: Scene) -> None:
     """NotApplicable for arrays and surfaces of which forward scatter is not computed."""
-    for name, value in (("edges=True", options.edges), (f"bounces={options.bounces}", options.bounces > 1)):
-        if value:
-            raise NotApplicable(f"forward=True is not computed together with {name}; give one of them")
+    refuse_forward_with(options.bounces, options.edges)
     if options.array is not None:
         raise NotApplicable("forward=True is for one transmitter and one receiver, not for an array")
     if random(scene).any():

@@ -5,10 +5,27 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from ..base.errors import NotApplicable
 from ..base.options import Options, option
 from ..base.validation import count, flag, number
 
 MOST_BOUNCES = 8
+# Why forward scatter is not computed with others: what an error says after the name of the other
+NOT_WITH_FORWARD = {
+    "bounces": "between facets waves are those of geometrical optics, in which a body's shadow is dark already: the "
+    "field that forward=True adds behind it would count that shadow twice",
+    "edges": "currents of edges on a face that the wave grazes are infinite straight ahead, where forward=True is "
+    "needed",
+}
+
+
+def refuse_forward_with(bounces: int, edges: bool) -> None:
+    """NotApplicable, with the reason, for options that do not go with forward=True."""
+    for name, said, value in (("edges", "edges=True", edges), ("bounces", f"bounces={bounces}", bounces > 1)):
+        if value:
+            raise NotApplicable(
+                f"forward=True is not computed together with {said}; {NOT_WITH_FORWARD[name]}: give one of them"
+            )
 
 
 def _bounces(name: str, asked: object) -> int:

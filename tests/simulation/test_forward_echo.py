@@ -53,7 +53,8 @@ def test_wide_angles_without_it_are_warned_of():
     [
         ({"array": sarcl.AntennaArray.linear(3, spacing=0.05)}, "not for an array"),
         ({"scene": shapes.box((1, 1, 1), roughness=0.1)}, "facet 0 has a random echo"),
-        ({"edges": True}, "not computed together with edges=True"),
+        ({"edges": True}, "not computed together with edges=True; currents of edges .* infinite straight ahead"),
+        ({"bounces": 2}, "not computed together with bounces=2; .* would count that shadow twice"),
         ({"method": "factorized"}, 'method="factorized" is not possible'),
     ],
 )

@@ -19,6 +19,11 @@ from ...simulation.track_options import Polarization, TrackOptions, file_name, p
 class FullwaveOptions(TrackOptions, BlockOptions):
     """Options of `fullwave_echo`."""
 
+    absent = dict.fromkeys(
+        ("bounces", "edges", "crease", "forward", "shadows"),
+        "Maxwell's equations hold all reflections, edges, shadows and forward scatter; leave it out",
+    )
+
     polarization: Polarization | Literal["all"] | Sequence[Polarization] = option(
         "HH",
         '"HH", "HV", "VH" or "VV" (first received, then sent), a sequence of these, or "all": one row per pulse for '

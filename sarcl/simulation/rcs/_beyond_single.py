@@ -18,6 +18,7 @@ from ...numerics.pulse_geometry import PulseGeometry
 from ...scattering.antenna_weights import AntennaWeights
 from ..bounces.bounce_spreader import BounceScene, BounceSpreader
 from ..edges.edge_echoes import EdgeEchoes, PreparedEdges
+from ..reflection_options import refuse_forward_with
 from ..spreading import ChannelView
 from ._rcs_task import UP, RcsTask
 
@@ -46,7 +47,7 @@ def refuse_together(task: RcsTask) -> None:
     if not asked:
         return
     if task.is_forward:
-        raise NotApplicable(f"forward=True is not computed together with {asked[0]}; give one of them")
+        refuse_forward_with(options.bounces, options.edges)
     if options.bounces > 1 and not options.shadows:
         raise ValueError(
             f"bounces is {options.bounces} with shadows=False; what reflects to another facet also shades it: give "

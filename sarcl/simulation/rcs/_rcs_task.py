@@ -78,6 +78,7 @@ def rcs_task(
     validation.finite("frequency", frequencies)
     if not (frequencies > 0).all():
         raise ValueError(f"frequency reaches {frequencies.min():g} Hz; it must be greater than 0")
+    validation.carriers("frequency", frequencies)
     if frequencies.ndim > 1:
         raise ValueError(f"frequency has shape {frequencies.shape}; give one, or a list of them (n,)")
     if not angles[0].size or not frequencies.size:

@@ -23,6 +23,12 @@ SKIPS = ("zero reflectivity", "facing away", "range window")
 class SpectralEchoOptions(SceneOptions, BlockOptions):
     """Options of `spectral_echo`."""
 
+    absent = dict.fromkeys(
+        ("edges", "crease"),
+        "it transforms maps of facets, whose amplitudes change slowly along the track, as those of edges do "
+        "not; use echo",
+    ) | {"forward": "it is for one antenna, to which nothing is scattered forwards; use echo with a receiver"}
+
     variant: Literal["exact", "saras"] = option(
         "exact",
         '"exact": no approximation but those that the tolerance bounds. The response of a scatterer along the track is '

@@ -43,8 +43,15 @@ def test_what_does_not_go_with_several_reflections_is_refused_by_name(options, t
 def test_spectral_echo_and_fullwave_echo_refuse_bounces():
     with pytest.raises(NotApplicable, match=r"bounces is 2.*echo"):
         sarcl.spectral_echo(SCENE, CHIRP, TRACK, bounces=2)
-    with pytest.raises(TypeError, match="bounces"):
-        sarcl.fullwave_echo(SCENE, CHIRP, TRACK, bounces=2)
+    for verb, name, value, reason in (
+        (sarcl.fullwave_echo, "bounces", 2, "Maxwell's equations hold all reflections"),
+        (sarcl.fullwave_echo, "edges", True, "leave it out"),
+        (sarcl.fullwave_echo, "forward", True, "leave it out"),
+        (sarcl.spectral_echo, "edges", True, "use echo"),
+        (sarcl.spectral_echo, "forward", True, "use echo with a receiver"),
+    ):
+        with pytest.raises(TypeError, match=f"{verb.__name__} has no option '{name}': .*{reason}"):
+            verb(SCENE, CHIRP, TRACK, **{name: value})
 
 
 def test_a_report_counts_contributions_by_reflections_and_has_their_error():
