@@ -201,10 +201,9 @@ def carriers(name: str, value: np.ndarray) -> None:
         return
     f = float(value[outside].flat[0])
     units = [(unit, f * scale) for unit, scale in (("GHz", 1e9), ("MHz", 1e6)) if 0 < f < 1e12 / scale]
-    remedy = f"is it in {units[0][0]}? Give {units[0][1]:.4g}" if units else "was a unit counted twice?"
-    raise ValueError(
-        f"{name} is {f:g} Hz; carriers lie between {LOWEST_CARRIER:g} and {HIGHEST_CARRIER:g} Hz: {remedy}"
-    )
+    remedy = f"is it in {units[0][0]}? Give {units[0][1]:g}" if units else "was a unit counted twice?"
+    limits = f"{LOWEST_CARRIER:.0e} and {HIGHEST_CARRIER:.0e}".replace("+0", "").replace("+", "")
+    raise ValueError(f"{name} is {f:g} Hz; carriers lie between {limits} Hz: {remedy}")
 
 
 def tolerance(value: object) -> float:

@@ -68,7 +68,8 @@ def _matches(info: DeviceInfo, choice: object) -> bool:
     text = str(choice).strip().lower()
     if text.isdecimal() or not isinstance(choice, str):
         return info.index == int(text)
-    return text == info.kind or text in f"{info.platform} {info.name}".lower()
+    short = "pocl" if info.platform == _linker.PLATFORM else ""  # its name is long
+    return text == info.kind or text in f"{info.platform} {info.name} {short}".lower()
 
 
 def _listing() -> str:

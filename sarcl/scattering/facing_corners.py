@@ -128,7 +128,7 @@ class _Corner:
             places = part.corners.mean(axis=1)
             steps = [end[pulse] - places for end in (antennas.tx, antennas.rx)]
             paths = sum(np.linalg.norm(step, axis=1) for step in steps)
-            both = sum(unit(step) for step in steps)
+            both = unit(steps[0]) + unit(steps[1])
             b, c = (dot(part.corners[:, i] - part.corners[:, 0], both)[:, None] * waves for i in (1, 2))
             sine = np.maximum(both @ part.normal / 2, 0)
             sent = _reflected(scene, part, sine, frequency) * sine * part.area
@@ -197,7 +197,8 @@ def _parts(scene: Scene, wavelength: float) -> list[_Part]:
     some = np.flatnonzero(coherent(scene) & (scene.reflectivity > 0))
     triangles = scene.triangles[some]
     normals, areas = normals_and_areas(triangles)
-    some, triangles, normals, areas = (one[areas > 0] for one in (some, triangles, normals, areas))
+    has_area = areas > 0
+    some, triangles, normals, areas = some[has_area], triangles[has_area], normals[has_area], areas[has_area]
     if not len(some):
         return []
     size = float(np.linalg.norm(np.diff(box(triangles.reshape(-1, 3)), axis=0)))
@@ -220,7 +221,7 @@ def _reflected(scene: Scene, part: _Part, sine: np.ndarray, frequency: float) ->
     """Moduli of a part's coefficients of H and V at sines between it and the ray (n,), less its roughness: (2, n)."""
     material = scene.materials[scene.material[part.facet]]
     phase = 4 * np.pi * frequency / SPEED_OF_LIGHT * np.hypot(material.height, scene.roughness[part.facet]) * sine
-    coefficients = np.abs(fresnel(np.clip(sine, 0, 1), np.complex128(material.permittivity(frequency))))
+    coefficients = np.abs(fresnel(np.clip(sine, 0, 1), np.asarray(material.permittivity(frequency))))
     return np.asarray(coefficients * np.exp(-(phase**2) / 2) * scene.reflectivity[part.facet])
 
 

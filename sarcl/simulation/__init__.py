@@ -12,6 +12,7 @@ For other folders:
     echo_task          one task of echo: its arguments, checked
     kernel_images      error of scatterers that lie so evenly that the images of the interpolation kernel add up
     reflection_options options of several reflections and of edges
+    scene_defects      facets that lie on one another, and antennas inside bodies
     scene_echoes       a scene prepared for the kernels, and its echoes added channel by channel
     scene_options      options that echo and spectral_echo share
     scene_plan         shares of the tolerance for the parts of a scene, and how its facets are cut within them

@@ -22,6 +22,7 @@ from . import echo_sampling
 from .echo_options import EchoOptions
 from .echo_request import EchoRequest
 from .reflection_options import refuse_forward_with
+from .scene_defects import refuse_inside, warn_of_coincident
 
 KEPT = 1 / 16  # of the memory for blocks, for results that a scene keeps for the next call
 
@@ -80,6 +81,8 @@ def echo_task(scene: Scene, waveform: Waveform, track: Trajectory, options: Echo
                 "single reflections alone are computed: give bounces=1, or materials without thickness"
             )
         tx, rx = sends.positions, echo_sampling.receiver_positions(sends, hears)
+        refuse_inside(real, *([tx] if hears is None else [tx, rx]))
+        warn_of_coincident(scene)
         if options.forward and not np.array_equal(tx, rx):
             refuse_forward(options, real)
         echo_sampling.warn_of_wide_angles(tx - real.center, rx - real.center, options.forward)

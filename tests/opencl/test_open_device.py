@@ -39,6 +39,8 @@ def test_device_is_chosen_by_argument_then_environment_then_kind(monkeypatch):
     assert open_device(info.index).info == info
     assert open_device(str(info.index)).info == info
     assert open_device(info.name[:12].upper()).info.name == info.name
+    if info.platform == "Portable Computing Language":
+        assert open_device("PoCL").info.platform == info.platform
     opened = open_device(info.kind)
     assert open_device(opened) is opened
     monkeypatch.setenv("SARCL_DEVICE", "no such thing")

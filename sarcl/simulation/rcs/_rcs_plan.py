@@ -24,6 +24,7 @@ from ...scene.triangles import centroids, normals
 from ...visibility.lit_parts import FacetPieces, LitParts
 from ..echo_check import exact_light
 from ..echo_sampling import warn_of_wide_angles
+from ..scene_defects import warn_of_coincident
 from ._beyond_single import add_beyond_single_reflections, seconds_beyond, terms_beyond
 from ._rcs_task import UP, RcsTask
 from ._screens import Screens
@@ -95,6 +96,7 @@ class RcsPlan:
         part = self._facets()
         if part is not None:
             warn_of_curves(task)
+            warn_of_coincident(task.scene)
             warn_of_wide_angles(task.to_tx, task.to_rx, task.options.forward)
             self._add_facets(part, out)
             if task.options.check:

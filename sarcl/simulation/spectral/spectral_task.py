@@ -17,6 +17,7 @@ from ...scattering import antenna_weights
 from ...scene.scene import Scene
 from .. import echo_sampling
 from ..echo_request import EchoRequest
+from ..scene_defects import refuse_inside, warn_of_coincident
 from ..scene_options import SceneOptions
 from ..scene_plan import SeenScene
 from ._straight_track import StraightTrack, straight_track
@@ -80,6 +81,8 @@ def spectral_task(
     _, _, motion = echo_sampling.in_flight(track, None, scene, point)
     reference_range = echo_sampling.half_path(tx, tx, point)
     real = scene.realized(request.seed).at_frequency(waveform.center)
+    refuse_inside(real, tx)
+    warn_of_coincident(scene)
     weights = antenna_weights.weights_of(options.antenna, options.radar, track, None, waveform, real.center)
     near, far = echo_sampling.window(real, waveform, tx, tx, reference_range, options.range_window)
     frequency, step, n_samples = echo_sampling.sampling(waveform, near, far, options.compressed)
