@@ -113,11 +113,11 @@ class Beams:
     def __len__(self) -> int:
         return len(self.pulse)
 
-    def __getitem__(self, some: np.ndarray) -> Beams:
-        """Beams `some` (n,), in rising order."""
-        kept, chain = np.unique(self.chain[some], return_inverse=True)
-        chains, normals = self.chains[kept], self.normals[kept]
-        return Beams(chain, self.pulse[some], chains, normals, self.apex[some], self.polygons[some])
+    def __getitem__(self, rows: np.ndarray) -> Beams:
+        """Beams `rows` (n,), in rising order."""
+        old_chain, chain = np.unique(self.chain[rows], return_inverse=True)
+        chains, normals = self.chains[old_chain], self.normals[old_chain]
+        return Beams(chain, self.pulse[rows], chains, normals, self.apex[rows], self.polygons[rows])
 
     @property
     def order(self) -> int:
@@ -187,8 +187,8 @@ def reached(surfaces: Surfaces, beams: Beams, turn: float) -> tuple[np.ndarray, 
     image = mirrored(beams.apex[beams.first_of], normal, surfaces.centers[last])
     chain, facet = _reached(surfaces, last, *beams.bounds(beams.polygons), image, 2 * turn)
     height = dot3(surfaces.corners[facet] - surfaces.centers[last[chain], None], normal[chain])
-    some = height.max(axis=1, initial=-np.inf) > surfaces.on_plane
-    return chain[some], facet[some]
+    is_in_front = height.max(axis=1, initial=-np.inf) > surfaces.on_plane
+    return chain[is_in_front], facet[is_in_front]
 
 
 def _reached(
@@ -196,14 +196,14 @@ def _reached(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Pairs of a sphere on facet `last` (c,) and a facet in the cone from an image, m (c, 3), that may face it."""
     which, facet = surfaces.tree.within(_cones(center, radius, image, turn))
-    some = (facet != last[which]) & surfaces.mirrors[facet]
-    which, facet = which[some], facet[some]
-    some = np.ones(len(which), bool)
+    is_mirror = (facet != last[which]) & surfaces.mirrors[facet]
+    which, facet = which[is_mirror], facet[is_mirror]
+    may_face = np.ones(len(which), bool)
     for own, other in ((last[which], facet), (facet, last[which])):  # a corner of one is in front of the other
         height = dot3(surfaces.corners[other] - surfaces.centers[own, None], surfaces.normals[own])
         height = np.where(surfaces.two_sided[own, None], np.abs(height), height)
-        some &= folded(np.maximum, height) > surfaces.on_plane
-    return which[some], facet[some]
+        may_face &= folded(np.maximum, height) > surfaces.on_plane
+    return which[may_face], facet[may_face]
 
 
 def dot3(corners: np.ndarray, axis: np.ndarray) -> np.ndarray:
@@ -229,15 +229,15 @@ def extended(
         if rx is not None:
             reflects &= faces(surfaces, target, normal, rx[beams.pulse[row]])
         reflects &= ~apart(surfaces.corners[target], planes[row], beams.polygons.corners[row])
-        some = np.flatnonzero(reflects)
-        row, place, target, normal = row[some], place[some], target[some], normal[some]
+        rows = np.flatnonzero(reflects)
+        row, place, target, normal = row[rows], place[rows], target[rows], normal[rows]
         polygons, last = surfaces.polygons[target], beams.last[row]
         side = beams.normals[beams.chain[row], -1]
         polygons = polygons.clipped(polygons.heights(side, surfaces.centers[last], surfaces.on_plane))
         polygons = polygons.seen_through(planes[row], beams.polygons.corners[row], surfaces.snap)
-        some = np.flatnonzero(polygons.area > LEAST_AREA * surfaces.areas[target])
-        key = 2 * place[some] + (dot(normal[some], surfaces.normals[target[some]]) > 0)
-        parts.append((key, row[some], target[some], normal[some], polygons[some]))
+        rows = np.flatnonzero(polygons.area > LEAST_AREA * surfaces.areas[target])
+        key = 2 * place[rows] + (dot(normal[rows], surfaces.normals[target[rows]]) > 0)
+        parts.append((key, row[rows], target[rows], normal[rows], polygons[rows]))
     if not parts:
         return beams[np.zeros(0, np.int64)], n_pairs
     key, row, target, normal = (np.concatenate([part[i] for part in parts]) for i in range(4))

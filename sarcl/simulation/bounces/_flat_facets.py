@@ -23,8 +23,8 @@ def joined_facets(triangles: np.ndarray, groups: np.ndarray, diagonal: float) ->
     groups  (k,) int: triangles of different groups are not joined
     """
     edge, back = _shared_edges(triangles)
-    some = edge < back
-    edge, back = edge[some], back[some]
+    is_first = edge < back
+    edge, back = edge[is_first], back[is_first]
     own, other = edge // 3, back // 3
     begin, end = triangles[own, edge % 3], triangles[own, (edge + 1) % 3]
     tip, far = triangles[own, (edge + 2) % 3], triangles[other, (back + 2) % 3]
@@ -47,8 +47,8 @@ def joined_facets(triangles: np.ndarray, groups: np.ndarray, diagonal: float) ->
     corners[own[pairs]] = np.stack([end, tip, begin, far], axis=1)[pairs]
     count = np.full(len(triangles), 3)
     count[own[pairs]], count[other[pairs]] = 4, 0
-    rest = np.flatnonzero(count)
-    return Polygons(corners[rest], count[rest]), rest
+    first = np.flatnonzero(count)
+    return Polygons(corners[first], count[first]), first
 
 
 def closed(triangles: np.ndarray) -> np.ndarray:
