@@ -200,7 +200,7 @@ class SceneEchoes:
 
     def check_seen(self, counts: Counts, near: float, far: float) -> None:
         """NothingSeen where nothing at all was added within the range window from near to far, m."""
-        counts = replace(counts, pairs=counts.pairs - counts.unseen, unseen=0)
+        counts = replace(counts, pairs=counts.pairs - counts.unseen - counts.weak, unseen=0, weak=0)
         if counts.outside_window == counts.pairs:
             raise NothingSeen(OUTSIDE_WINDOW.format(near, far))
         if counts.outside_window + counts.outside_beam == counts.pairs:
@@ -218,6 +218,7 @@ class SceneEchoes:
             skipped["out of beam"] = counts.outside_beam
         if self.bounced is not None:
             skipped["no reflection from facet to facet"] = counts.unseen
+            skipped["weak reflections"] = counts.weak
         return {
             "contributions_done": counts.contributing,
             "contributions_skipped": {**skipped, "range window": counts.outside_window},

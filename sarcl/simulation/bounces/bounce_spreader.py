@@ -21,10 +21,12 @@ from ._amplitudes import Coatings, Facets
 from ._beams import Beams, Surfaces
 from ._flat_facets import closed, joined_facets
 from ._polygons import Polygons
+from ._weak_beams import bounds, strong
 
 PULSES_AT_ONCE, BEAMS_AT_ONCE = 128, 60_000  # pulses of a block, and pairs of these and facets that reflect to others
 MOST_TURN = 0.05  # rad, by which directions to antennas differ within a block
-CURVATURE = 1.0  # rad over the tolerance: phase of the wave's curvature over a triangle
+WEAK = 0.1  # of the tolerance: sum of the bounds of beams that are left out
+CURVATURE = 0.9  # rad over the tolerance: phase of the wave's curvature over a triangle; the rest is for weak beams
 DIRECTION = 0.5  # rad over the root of the tolerance: by which directions change over a triangle
 PROFILES = 1 / 300  # of the tolerance: error of sums over frequencies
 NODES = 6  # frequencies at which matrices of dispersive materials are computed
@@ -137,34 +139,42 @@ class BounceSpreader:
         if len(facets) * len(pulses) > BEAMS_AT_ONCE and half:
             (a, counts), (b, more) = (self.values(p, frequencies, exact=exact) for p in (pulses[:half], pulses[half:]))
             return np.concatenate([a, b]), counts + more
-        for beams, pieces, of, n_pairs in self._lit_beams(_beams.first(surfaces, tx, facets), rx, turn):
+        power = np.zeros(len(pulses))
+
+        def followed(beams: Beams) -> tuple[Beams, Counts]:
+            return self._followed(beams, pulses, rx, frequencies, np.zeros(len(pulses)) if exact else power)
+
+        for beams, pieces, of, part in self._lit_beams(_beams.first(surfaces, tx, facets), rx, turn, followed):
             outside, seen = 0, np.bincount(of, minlength=len(beams)) > 0
             if len(of):
                 triangles = self._facets(beams, pieces, of, rx)
                 inside = self._inside(triangles, pulses)
                 outside = int(seen.sum()) - len(np.unique(triangles.of[inside]))
-                self._add(out, pulses, frequencies, triangles.chosen(inside), exact)
+                echo = np.zeros_like(out)
+                self._add(echo, pulses, frequencies, triangles.chosen(inside), exact)
+                power += (np.abs(echo) ** 2).sum(axis=1).mean(axis=1)
+                out += echo
             done = int(seen.sum()) - outside
-            counts += Counts(
-                n_pairs, outside, unseen=n_pairs - outside - done, orders=(0,) * (beams.order - 1) + (done,)
-            )
+            unseen = part.pairs - part.outside_window - part.weak - outside - done
+            counts += part + Counts(0, outside, unseen=unseen, orders=(0,) * (beams.order - 1) + (done,))
         return out, counts
 
     def _lit_beams(
-        self, beams: Beams, rx: np.ndarray, turn: float
-    ) -> Iterator[tuple[Beams, Polygons, np.ndarray, int]]:
+        self, beams: Beams, rx: np.ndarray, turn: float, followed: Callable[[Beams], tuple[Beams, Counts]]
+    ) -> Iterator[tuple[Beams, Polygons, np.ndarray, Counts]]:
         """Beams of each order from 2 on, their pulses counted from 0, what receivers, m (n, 3), see of them, the beam
-        of each piece, and the number of pairs of beam and facet that were looked at; beams  of the first order."""
+        of each piece, and the pairs of beam and facet that were looked at, and left out before their shadows."""
         surfaces = self._surfaces
         for number in range(2, self.scene.bounces + 1):
             if not len(beams):
                 return
             last = rx if number == self.scene.bounces else None
             beams, n_pairs = _beams.extended(surfaces, beams, *_beams.reached(surfaces, beams, turn), last)
+            beams, part = followed(beams)
             pieces, of = _occlusion.lit(surfaces, beams, turn)
             arrives = np.bincount(of, minlength=len(beams)) > 0
             beams, of = beams[np.flatnonzero(arrives)], (np.cumsum(arrives) - 1)[of]
-            yield beams, *_occlusion.seen(surfaces, beams, pieces, of, rx[beams.pulse], turn), n_pairs
+            yield beams, *_occlusion.seen(surfaces, beams, pieces, of, rx[beams.pulse], turn), part + Counts(n_pairs)
 
     def _turn(self, antennas: np.ndarray) -> float:
         """Angle, rad, by which directions from any facet to antennas, m (n, 3), differ from those to the middle one."""
@@ -198,6 +208,23 @@ class BounceSpreader:
             )
         of = np.concatenate(numbers)
         return Facets(np.concatenate(parts), beams[of], rx[beams.pulse[of]], of)
+
+    def _followed(
+        self, beams: Beams, pulses: np.ndarray, rx: np.ndarray, frequencies: np.ndarray, power: np.ndarray
+    ) -> tuple[Beams, Counts]:
+        """Beams less those that arrive after the range window, as no path to the receiver is shorter than the straight
+        line, and less weak ones of the last order; and how many these are. power  m^2 (n,), of the orders before."""
+        view, number = self.view, len(beams)
+        if view.gated:
+            center, radius = beams.polygons.spheres
+            path = sum(np.linalg.norm(end - center, axis=1) for end in (beams.apex, rx[beams.pulse])) - 2 * radius
+            row = pulses[beams.pulse]
+            beams = beams[np.flatnonzero(path / 2 - view.antennas.reference_range[row] <= view.antennas.far[row])]
+        late = number - len(beams)
+        if beams.order == self.scene.bounces and power.any() and not view.weights.is_needed:
+            bound = bounds(beams, self._coatings, frequencies, len(view.polarizations))
+            beams = beams[strong(bound, beams.pulse, WEAK * self.scene.tolerance * np.sqrt(power))]
+        return beams, Counts(0, late, weak=number - late - len(beams))
 
     def _inside(self, facets: Facets, pulses: np.ndarray) -> np.ndarray:
         """Numbers of the triangles inside the range window."""
