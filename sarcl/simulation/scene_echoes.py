@@ -187,8 +187,9 @@ class SceneEchoes:
             edges = EdgeEchoes(self.edges, view)
             spreaders.append(edges)
         if self.bounced is not None:
-            spreaders.append(BounceSpreader(self.bounced, view))
-            parts.append((ErrorTerm("bounces", self.bounced.tolerance, SMALLER_TOLERANCE), {}))
+            bounces = BounceSpreader(self.bounced, view)
+            spreaders.append(bounces)
+            parts.append((ErrorTerm("bounces", self.bounced.tolerance, SMALLER_TOLERANCE), bounces.describe()))
         chosen = max(parts, key=lambda part: (bool(part[1]), part[0].value))[1] if parts else {}
         model = {"model": model_words(request)} if parts else {}
         words = {**model, **chosen, **(self.weights.describe(self.weight_error) if parts else {})}

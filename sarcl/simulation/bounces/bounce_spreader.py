@@ -11,6 +11,7 @@ import numpy as np
 
 from ...base.boxes import box
 from ...base.constants import SPEED_OF_LIGHT
+from ...base.errors import warn
 from ...base.stage_timer import Clock
 from ...numerics.polynomials import chebyshev, lagrange
 from ...scene.scene import Scene
@@ -29,6 +30,7 @@ WEAK = 0.1  # of the tolerance: sum of the bounds of beams that are left out
 CURVATURE = 0.9  # rad over the tolerance: phase of the wave's curvature over a triangle; the rest is for weak beams
 DIRECTION = 0.5  # rad over the root of the tolerance: by which directions change over a triangle
 PROFILES = 1 / 300  # of the tolerance: error of sums over frequencies
+NARROW = 0.5  # share of the area in facets narrower than a wavelength from which on there is a warning
 NODES = 6  # frequencies at which matrices of dispersive materials are computed
 
 
@@ -74,6 +76,13 @@ class BounceScene:
         flags = surfaces.two_sided[some], surfaces.mirrors[some], surfaces.closed[some]
         return Surfaces(polygons, *flags), coatings
 
+    def narrow_share(self, wavelength: float) -> float:
+        """Share of the area that reflects to others in facets narrower than a wavelength, m, once flat parts are
+        joined."""
+        polygons = self.joined[0].polygons[self.joined[0].mirrors]
+        area, length = polygons.area, 2 * polygons.spheres[1]
+        return float(area[area < wavelength * length].sum() / area.sum())
+
     @cached_property
     def mirrors(self) -> np.ndarray:
         """Numbers of the facets that reflect."""
@@ -85,6 +94,7 @@ class BounceSpreader:
     receiver sees, by physical optics on that facet.
 
     predicted_error  relative to these echoes at random phases
+    narrow           share of the area in facets narrower than a wavelength
     """
 
     def __init__(self, scene: BounceScene, view: ChannelView) -> None:
@@ -93,10 +103,19 @@ class BounceSpreader:
         surfaces, self._coatings = scene.joined
         antennas = np.concatenate([view.antennas.tx, view.antennas.rx]) - scene.origin
         self._surfaces = surfaces.seen_from(antennas)
+        wavelength = SPEED_OF_LIGHT / float(np.median(view.frequencies))
+        self.narrow = scene.narrow_share(wavelength)
+        if self.narrow > NARROW:
+            warn(
+                f"mesh too fine for bounces={scene.bounces}: {self.narrow:.0%} of the reflecting area is in facets "
+                f"narrower than the wavelength, {wavelength:.2g} m, whose waves spread more than those of geometrical "
+                "optics; take a coarser mesh of curved parts (flat ones are joined), or a higher frequency",
+                "narrow facets",
+            )
 
     def describe(self) -> dict[str, Any]:
         """Words and numbers for a report."""
-        return {"bounces": self.scene.bounces}
+        return {"facets narrower than a wavelength": f"{self.narrow:.0%} of the area"} if self.narrow > NARROW else {}
 
     def add(
         self, samples: np.ndarray, pulses: Sequence[int], clock: Clock, on_progress: Callable[[int], object]
