@@ -86,6 +86,10 @@ class Surfaces:
         within = ((antennas >= low) & (antennas <= high)).all(axis=1).any()
         return replace(self, closed=np.zeros_like(self.closed)) if within else self
 
+    def side(self, facets: np.ndarray, normal: np.ndarray) -> np.ndarray:
+        """1 (n,) where facets (n,) reflect on the side of their own normal, else 0; normal  on that side (n, 3)."""
+        return (dot(normal, self.normals[facets]) > 0).astype(np.int64)
+
     def facing(self, facets: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Unit normals (n, 3) of facets (n,) on the sides of places, m (n, 3); and whether these sides reflect (n,)."""
         normal = self.normals[facets]
@@ -212,10 +216,17 @@ def dot3(corners: np.ndarray, axis: np.ndarray) -> np.ndarray:
 
 
 def extended(
-    surfaces: Surfaces, beams: Beams, chain: np.ndarray, facet: np.ndarray, rx: np.ndarray | None = None
+    surfaces: Surfaces,
+    beams: Beams,
+    chain: np.ndarray,
+    facet: np.ndarray,
+    rx: np.ndarray | None = None,
+    sides: np.ndarray | None = None,
 ) -> tuple[Beams, int]:
     """The beams after one facet more, without shadows, for pairs (p,) of a chain and a facet; and how many pairs of a
-    beam and a facet were looked at. rx  receivers, m (n_pulses, 3): only beams on facets that face them."""
+    beam and a facet were looked at. rx  receivers, m (n_pulses, 3): only beams on facets that face them
+    sides  (k, 2): only beams on these sides of facets, behind and in front
+    """
     image = mirrored(beams.apex, beams.normals[beams.chain, -1], surfaces.centers[beams.last])
     planes = beams.polygons.edge_planes(image)
     n_pairs, parts = 0, []
@@ -228,6 +239,8 @@ def extended(
         normal, reflects = surfaces.facing(target, image[row])
         if rx is not None:
             reflects &= faces(surfaces, target, normal, rx[beams.pulse[row]])
+        if sides is not None:
+            reflects &= sides[target, surfaces.side(target, normal)]
         reflects &= ~apart(surfaces.corners[target], planes[row], beams.polygons.corners[row])
         rows = np.flatnonzero(reflects)
         row, place, target, normal = row[rows], place[rows], target[rows], normal[rows]

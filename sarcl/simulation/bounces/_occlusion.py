@@ -7,7 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...base.vectors import dot, unit
-from ._beams import LEAST_AREA, Beams, Surfaces, faces, in_blocks, mirrored
+from ._beams import EDGE_ON as EDGE_FADES
+from ._beams import LEAST_AREA, Beams, Surfaces, faces, first, in_blocks, mirrored
 from ._facet_tree import Cones
 from ._polygons import Polygons, Shadows, less_shadows
 
@@ -19,11 +20,29 @@ def lit(surfaces: Surfaces, beams: Beams, turn: float) -> tuple[Polygons, np.nda
 
     turn  rad: directions to two of the antennas' positions differ by no more
     """
-    pieces, of = beams.polygons, np.arange(len(beams))
+    rows = np.arange(len(beams))  # beams of which something is lit on the legs so far
+    pieces, of = beams.polygons, rows
     for leg, end, image, start in _legs(surfaces, beams):
-        chain, shapes = _between(surfaces, beams, leg, end, image, start, turn)
-        pieces, of = _less(surfaces, beams, pieces, of, beams.apex, chain, shapes)
+        lit_beams = beams[rows]
+        chain, shapes = _between(surfaces, lit_beams, leg, end[rows], image[rows], start[rows], turn)
+        place = np.searchsorted(rows, of)
+        pieces, place = _less(surfaces, lit_beams, pieces, place, lit_beams.apex, chain, shapes)
+        of = rows[place]
+        rows = np.unique(of)
     return pieces, of
+
+
+def sides_seen(surfaces: Surfaces, antennas: np.ndarray, turn: float) -> np.ndarray:
+    """Whether antennas, m (n, 3), may see facets on the side behind their normal and on that in front (k, 2)."""
+    out = np.zeros((len(surfaces.areas), 2), bool)
+    beams = first(surfaces, antennas, np.flatnonzero(surfaces.mirrors))
+    beams = beams[np.unique(lit(surfaces, beams, turn)[1])]
+    facet = beams.chains[:, 0]
+    out[facet, surfaces.side(facet, beams.normals[:, 0])] = True
+    for place in antennas:  # edge-on, where physical optics fades out
+        sine = dot(surfaces.normals, unit(place - surfaces.centers))
+        out[np.abs(sine) <= EDGE_FADES] = True
+    return out
 
 
 def seen(

@@ -30,6 +30,7 @@ WEAK = 0.1  # of the tolerance: sum of the bounds of beams that are left out
 CURVATURE = 0.9  # rad over the tolerance: phase of the wave's curvature over a triangle; the rest is for weak beams
 DIRECTION = 0.5  # rad over the root of the tolerance: by which directions change over a triangle
 PROFILES = 1 / 300  # of the tolerance: error of sums over frequencies
+MANY = 30  # facets that a beam may reach, on average, from which on shadows on single facets are looked at first
 NARROW = 0.5  # share of the area in facets narrower than a wavelength from which on there is a warning
 NODES = 6  # frequencies at which matrices of dispersive materials are computed
 
@@ -163,7 +164,7 @@ class BounceSpreader:
         def followed(beams: Beams) -> tuple[Beams, Counts]:
             return self._followed(beams, pulses, rx, frequencies, np.zeros(len(pulses)) if exact else power)
 
-        for beams, pieces, of, part in self._lit_beams(_beams.first(surfaces, tx, facets), rx, turn, followed):
+        for beams, pieces, of, part in self._lit_beams(facets, tx, rx, turn, followed):
             outside, seen = 0, np.bincount(of, minlength=len(beams)) > 0
             if len(of):
                 triangles = self._facets(beams, pieces, of, rx)
@@ -179,16 +180,35 @@ class BounceSpreader:
         return out, counts
 
     def _lit_beams(
-        self, beams: Beams, rx: np.ndarray, turn: float, followed: Callable[[Beams], tuple[Beams, Counts]]
+        self,
+        facets: np.ndarray,
+        tx: np.ndarray,
+        rx: np.ndarray,
+        turn: float,
+        followed: Callable[[Beams], tuple[Beams, Counts]],
     ) -> Iterator[tuple[Beams, Polygons, np.ndarray, Counts]]:
         """Beams of each order from 2 on, their pulses counted from 0, what receivers, m (n, 3), see of them, the beam
-        of each piece, and the pairs of beam and facet that were looked at, and left out before their shadows."""
+        of each piece, and the pairs of beam and facet that were looked at, and left out before their shadows.
+
+        facets  the first ones of beams;  followed  the beams that are, before their shadows are cut
+        """
         surfaces = self._surfaces
+        beams, lit = _beams.first(surfaces, tx, facets), None
         for number in range(2, self.scene.bounces + 1):
             if not len(beams):
                 return
-            last = rx if number == self.scene.bounces else None
-            beams, n_pairs = _beams.extended(surfaces, beams, *_beams.reached(surfaces, beams, turn), last)
+            pairs, sides = _beams.reached(surfaces, beams, turn), None
+            is_last = number == self.scene.bounces
+            if len(pairs[0]) > MANY * len(beams.chains):  # what is in shadow is worth knowing before
+                if number == 2:
+                    lit = _occlusion.sides_seen(surfaces, tx, turn)
+                    facet, normal = beams.chains[:, 0], beams.normals[:, 0]
+                    beams = beams[np.flatnonzero(lit[facet, surfaces.side(facet, normal)][beams.chain])]
+                    pairs = _beams.reached(surfaces, beams, turn)
+                if is_last:
+                    is_same = lit is not None and np.array_equal(tx, rx)
+                    sides = lit if is_same else _occlusion.sides_seen(surfaces, rx, turn)
+            beams, n_pairs = _beams.extended(surfaces, beams, *pairs, rx if is_last else None, sides)
             beams, part = followed(beams)
             pieces, of = _occlusion.lit(surfaces, beams, turn)
             arrives = np.bincount(of, minlength=len(beams)) > 0

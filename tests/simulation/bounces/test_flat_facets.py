@@ -129,3 +129,32 @@ def test_a_mesh_of_facets_narrower_than_a_wavelength_is_said():
     ):
         raw = echo(sarcl.Scene.facets(bent))
     assert "of the area" in str(raw.report.plan["facets narrower than a wavelength"])
+
+
+@pytest.mark.parametrize("bounces", [2, 3])
+def test_shadows_on_single_facets_looked_at_first_change_nothing(bounces, monkeypatch):
+    rng = np.random.default_rng(7)
+    triangles = np.concatenate(
+        [halves(PLATES), 0.5 + rng.uniform(-0.4, 0.4, (24, 1, 3)) + rng.uniform(-0.2, 0.2, (24, 3, 3))]
+    )
+    scene = sarcl.Scene.facets(triangles, two_sided=rng.random(len(triangles)) < 0.7)
+    samples, receiver = [], sarcl.Trajectory(None, np.array([[900, 300, 1.1e3]]))
+    for many in (0, 1000):
+        monkeypatch.setattr("sarcl.simulation.bounces.bounce_spreader.MANY", many)
+        samples += [
+            sarcl.echo(
+                scene, CHIRP, LOOK, receiver=other, bounces=bounces, reference=(0.5, 0.5, 0.5), range_window=(-9, 9),
+                tolerance=1e-2, check=False,
+            ).samples
+            for other in (None, receiver)
+        ]  # fmt: skip
+    for first, second in zip(samples[:2], samples[2:], strict=True):
+        assert np.linalg.norm(first - second) <= 1e-6 * np.linalg.norm(second)
+
+
+def test_too_many_pairs_of_facets_are_refused_with_a_remedy(monkeypatch):
+    monkeypatch.setattr("sarcl.simulation.bounces._facet_tree.MOST_PAIRS", 2)
+    with pytest.raises(
+        MemoryError, match=r"may reflect to one another in about .* ways.*fewer bounces, a coarser mesh"
+    ):
+        echo(sarcl.Scene.facets(halves(PLATES)))
