@@ -12,6 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ...base.constants import EDGE_ON
 from ...base.vectors import dot, unit
 from ._facet_tree import Cones, FacetTree
 from ._polygons import Polygons, apart, folded, joined
@@ -20,7 +21,9 @@ ON_PLANE = 1e-6  # of the scene's diagonal: corners nearer to a plane lie in it,
 SNAP = 1e-11  # of the diagonal: rounding of clipped corners
 LEAST_AREA = 1e-10  # of a facet: smaller polygons are rounding
 GRAZING = 1e-9  # sine of the angle between a facet and a ray, below which nothing is reflected
-EDGE_ON = 1e-5  # sine below which a facet is turned away from a receiver: physical optics fades out within 2e-6
+TURNED_AWAY = (
+    2 * EDGE_ON
+)  # sine below which a facet is turned away from a receiver: there physical optics has faded out
 MOST_ANGLE = 1.55  # rad, of a cone: wider ones hold everything in front
 ROWS_AT_ONCE = 200_000  # pairs of a beam and a facet that are looked at together
 
@@ -263,7 +266,7 @@ def extended(
 
 def faces(surfaces: Surfaces, facets: np.ndarray, normal: np.ndarray, rx: np.ndarray) -> np.ndarray:
     """Whether receivers, m (n, 3), may see facets (n,) on the sides of normals (n, 3), edge-on too."""
-    return np.asarray(dot(normal, unit(rx - surfaces.centers[facets])) > -EDGE_ON)
+    return np.asarray(dot(normal, unit(rx - surfaces.centers[facets])) > -TURNED_AWAY)
 
 
 def in_blocks(number: np.ndarray, most: int = ROWS_AT_ONCE) -> list[slice]:

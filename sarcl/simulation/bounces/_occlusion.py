@@ -7,8 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...base.vectors import dot, unit
-from ._beams import EDGE_ON as EDGE_FADES
-from ._beams import LEAST_AREA, Beams, Surfaces, faces, first, in_blocks, mirrored
+from ._beams import LEAST_AREA, TURNED_AWAY, Beams, Surfaces, faces, first, in_blocks, mirrored
 from ._facet_tree import Cones
 from ._polygons import Polygons, Shadows, less_shadows
 
@@ -41,7 +40,7 @@ def sides_seen(surfaces: Surfaces, antennas: np.ndarray, turn: float) -> np.ndar
     out[facet, surfaces.side(facet, beams.normals[:, 0])] = True
     for place in antennas:  # edge-on, where physical optics fades out
         sine = dot(surfaces.normals, unit(place - surfaces.centers))
-        out[np.abs(sine) <= EDGE_FADES] = True
+        out[np.abs(sine) <= TURNED_AWAY] = True
     return out
 
 
