@@ -11,11 +11,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull
 
-<<<<<<< HEAD
-from ...base.vectors import cross, distinct, dot
-=======
-from ...base.vectors import cross, dot, unit
->>>>>>> cebd66a2 (Flat parts of fine meshes are joined to few facets for several reflections; too fine curved meshes are said)
+from ...base.vectors import cross, distinct, dot, unit
 from ...scattering.physical_optics import normals_and_areas
 from ._polygons import Polygons, joined
 
