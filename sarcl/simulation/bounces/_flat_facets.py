@@ -17,10 +17,8 @@ from ._polygons import Polygons, joined
 
 FLAT = 1e-9  # of the diagonal: corners nearer to a plane or a line lie in it
 ROUNDING = 1e-9  # relative, of areas, and rad, of directions
-LONGEST, FEW = (
-    1 / 8,
-    32,
-)  # of the diagonal: longer polygons are halved, where they are more than a few: shadows cut them
+LONGEST = 1 / 8  # of the diagonal: longer polygons are halved, since the shadows of many others cut them into parts
+FEW = 32  # polygons that are not halved
 MOST_CORNERS = 6  # of a polygon: all are stored with as many corners as the largest one
 
 
