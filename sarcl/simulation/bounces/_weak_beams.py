@@ -23,9 +23,10 @@ AREA_BOUND = 2 * np.sqrt(2)  # B
 
 def bounds(beams: Beams, coatings: Coatings, frequencies: np.ndarray, n_polarizations: int) -> np.ndarray:
     """Bounds on echoes of beams, m (k,), root sum square over the polarisations, at any of the frequencies, Hz."""
-    lowest = float(frequencies.min())  # at which most is reflected
-    eps, wave = coatings.permittivity(lowest), 2 * np.pi * lowest / SPEED_OF_LIGHT
-    eps = np.where([m.thickness > 0 for m in coatings.materials], np.inf, eps)  # |R| <= 1 of sheets
+    band = float(frequencies.min()), float(frequencies.max())
+    wave, highest = (2 * np.pi * f / SPEED_OF_LIGHT for f in band)  # roughness takes least at the lowest frequency
+    is_sheet = np.array([m.thickness > 0 for m in coatings.materials])  # of which |R| <= 1
+    eps = np.stack([np.where(is_sheet, np.inf, coatings.permittivity(f)) for f in band])
     center, radius = beams.polygons.spheres
     distance = np.linalg.norm(center - beams.apex, axis=1)
     spread = radius / np.maximum(
@@ -38,9 +39,8 @@ def bounds(beams: Beams, coatings: Coatings, frequencies: np.ndarray, n_polariza
         ray = ray - 2 * dot(ray, normal)[:, None] * normal
         cosine = np.clip(-dot(ray, normal) - spread, 0, 1)
         loss = (2 * wave * coatings.height[facet] * cosine) ** 2 / 2
-        weight *= np.abs(fresnel(cosine, eps[coatings.material[facet]])[0]) * np.exp(-loss)
+        weight *= np.abs(fresnel(cosine, eps[:, coatings.material[facet]])[0]).max(axis=0) * np.exp(-loss)
         weight *= coatings.reflectivity[facet]
-    highest = 2 * np.pi * float(frequencies.max()) / SPEED_OF_LIGHT
     factor = highest / (2 * np.sqrt(np.pi)) * AREA_BOUND * np.sqrt(min(n_polarizations, 2))
     return np.asarray(factor * beams.polygons.area * weight)
 
