@@ -94,29 +94,29 @@ def _onto(scene: Reflectors, beam: _Beam, k: int, on_plane: float) -> _Beam | No
     if last is not None:  # nothing behind the facet that the beam leaves lies in its way
         others = [_in_front(other, scene.triangles[last][0], beam.normals[-1], on_plane) for other in others]
     axes, center = plane_axes(facet), facet.mean(axis=0)
-    whole = (facet - center) @ axes[:2].T
-    pieces = [whole]
+    outline = (facet - center) @ axes[:2].T
+    pieces = [outline]
     if last is not None:
         windows = [shadow(facet, polygon, image, on_plane) for polygon in beam.polygons]
-        pieces = [intersection(whole, window) for window in windows if len(window) and area(window) > 0]
+        pieces = [intersection(outline, window) for window in windows if len(window) and area(window) > 0]
     pieces = cut_away(pieces, _shadows(facet, others, image, on_plane))
-    pieces = [piece for piece in pieces if len(piece) > 2 and area(piece) > LEAST_AREA * area(whole)]
+    pieces = [piece for piece in pieces if len(piece) > 2 and area(piece) > LEAST_AREA * area(outline)]
     polygons = [center + piece @ axes[:2] for piece in pieces]
     return _Beam((*beam.facets, k), (*beam.normals, normal), image, polygons) if polygons else None
 
 
 def _in_front(polygon: np.ndarray, point: np.ndarray, normal: np.ndarray, on_plane: float) -> np.ndarray:
     """The part of a convex polygon, m (n, 3), in front of a plane; (0, 3) where that lies in the plane."""
-    height, rest = (polygon - point) @ normal, []
+    height, corners = (polygon - point) @ normal, []
     if height.max() <= on_plane:
         return np.zeros((0, 3))
     for i in range(len(polygon)):
         j = (i + 1) % len(polygon)
         if height[i] >= 0:
-            rest.append(polygon[i])
+            corners.append(polygon[i])
         if height[i] * height[j] < 0:
-            rest.append(polygon[i] + height[i] / (height[i] - height[j]) * (polygon[j] - polygon[i]))
-    return np.array(rest)
+            corners.append(polygon[i] + height[i] / (height[i] - height[j]) * (polygon[j] - polygon[i]))
+    return np.array(corners)
 
 
 def _shadows(facet: np.ndarray, others: list[np.ndarray], eye: np.ndarray, on_plane: float) -> list[np.ndarray]:

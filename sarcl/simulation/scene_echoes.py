@@ -187,8 +187,9 @@ class SceneEchoes:
             edges = EdgeEchoes(self.edges, view)
             spreaders.append(edges)
         if self.bounced is not None:
-            spreaders.append(BounceSpreader(self.bounced, view))
-            parts.append((ErrorTerm("bounces", self.bounced.tolerance, SMALLER_TOLERANCE), {}))
+            bounces = BounceSpreader(self.bounced, view)
+            spreaders.append(bounces)
+            parts.append((ErrorTerm("bounces", self.bounced.tolerance, SMALLER_TOLERANCE), bounces.describe()))
         chosen = max(parts, key=lambda part: (bool(part[1]), part[0].value))[1] if parts else {}
         model = {"model": model_words(request)} if parts else {}
         words = {**model, **chosen, **(self.weights.describe(self.weight_error) if parts else {})}
@@ -200,7 +201,7 @@ class SceneEchoes:
 
     def check_seen(self, counts: Counts, near: float, far: float) -> None:
         """NothingSeen where nothing at all was added within the range window from near to far, m."""
-        counts = replace(counts, pairs=counts.pairs - counts.unseen, unseen=0)
+        counts = replace(counts, pairs=counts.pairs - counts.unseen - counts.weak, unseen=0, weak=0)
         if counts.outside_window == counts.pairs:
             raise NothingSeen(OUTSIDE_WINDOW.format(near, far))
         if counts.outside_window + counts.outside_beam == counts.pairs:
@@ -218,6 +219,7 @@ class SceneEchoes:
             skipped["out of beam"] = counts.outside_beam
         if self.bounced is not None:
             skipped["no reflection from facet to facet"] = counts.unseen
+            skipped["weak reflections"] = counts.weak
         return {
             "contributions_done": counts.contributing,
             "contributions_skipped": {**skipped, "range window": counts.outside_window},

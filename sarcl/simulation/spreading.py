@@ -42,6 +42,7 @@ class Counts:
     outside_window  outside the range window;  facing_away  inside it, the facet seen from behind
     outside_beam    beyond the limits of an antenna's beam
     unseen          pairs of a beam and a facet that it does not reach, or that the receiver does not see
+    weak            beams whose echoes together are weaker than a share of the tolerance
     orders          beams of 1, 2 ... reflections that contributed, where several are followed
     late, power     mean |sample|^2, less the pulse's spectrum, of beams outside the range window, and of all samples
     latest          m about the reference: the latest of such beams
@@ -52,6 +53,7 @@ class Counts:
     facing_away: int = 0
     outside_beam: int = 0
     unseen: int = 0
+    weak: int = 0
     orders: tuple[int, ...] = ()
     late: float = 0.0
     power: float = 0.0
@@ -64,6 +66,7 @@ class Counts:
             self.facing_away + other.facing_away,
             self.outside_beam + other.outside_beam,
             self.unseen + other.unseen,
+            self.weak + other.weak,
             tuple(map(sum, zip_longest(self.orders, other.orders, fillvalue=0))),
             self.late + other.late,
             self.power + other.power,
@@ -73,7 +76,7 @@ class Counts:
     @property
     def contributing(self) -> int:
         """Pairs that were added up."""
-        return self.pairs - self.outside_window - self.facing_away - self.outside_beam - self.unseen
+        return self.pairs - self.outside_window - self.facing_away - self.outside_beam - self.unseen - self.weak
 
     @property
     def late_share(self) -> float:

@@ -13,6 +13,7 @@ For this folder alone:
     _occlusion       what lies in the way of beams
     _polygons        convex polygons in space, clipped many at a time
     _sums            sums over triangles at all frequencies of the samples
+    _weak_beams      bounds on the echoes of beams, and which are too weak to be followed
 """
 
 __all__ = ["bounce_spreader"]

@@ -91,12 +91,12 @@ class Facets:
         """Their unit normals on the sides that reflect (n, m, 3)."""
         return self.beams.normals[self.beams.chain]
 
-    def chosen(self, some: np.ndarray) -> Facets:
-        """These triangles."""
+    def chosen(self, rows: np.ndarray) -> Facets:
+        """The triangles `rows` (n,)."""
         return (
             self
-            if len(some) == len(self)
-            else Facets(self.triangles[some], self.beams[some], self.rx[some], self.of[some])
+            if len(rows) == len(self)
+            else Facets(self.triangles[rows], self.beams[rows], self.rx[rows], self.of[rows])
         )
 
     @property
@@ -165,7 +165,8 @@ def _reflected(
     is_normal = length < 1e-8  # any tangent does: R_v = -R_h
     t = np.where(is_normal, polarisation(ray)[0], across / np.where(is_normal, 1, length))
     r_h, r_v = fresnel(np.clip(-dot(ray, normal), 0, 1), eps)
-    before, after = cross(ray, t), cross(out, t)
+    incident, reflected = cross(ray, t), cross(out, t)
     return [
-        (r_h * (f * t).sum(axis=1))[:, None] * t + (r_v * (f * before).sum(axis=1))[:, None] * after for f in fields
+        (r_h * (f * t).sum(axis=1))[:, None] * t + (r_v * (f * incident).sum(axis=1))[:, None] * reflected
+        for f in fields
     ]

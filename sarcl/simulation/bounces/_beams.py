@@ -12,6 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ...base.constants import EDGE_ON
 from ...base.vectors import dot, unit
 from ._facet_tree import Cones, FacetTree
 from ._polygons import Polygons, apart, folded, joined
@@ -20,7 +21,9 @@ ON_PLANE = 1e-6  # of the scene's diagonal: corners nearer to a plane lie in it,
 SNAP = 1e-11  # of the diagonal: rounding of clipped corners
 LEAST_AREA = 1e-10  # of a facet: smaller polygons are rounding
 GRAZING = 1e-9  # sine of the angle between a facet and a ray, below which nothing is reflected
-EDGE_ON = 1e-5  # sine below which a facet is turned away from a receiver: physical optics fades out within 2e-6
+TURNED_AWAY = (
+    2 * EDGE_ON
+)  # sine below which a facet is turned away from a receiver: there physical optics has faded out
 MOST_ANGLE = 1.55  # rad, of a cone: wider ones hold everything in front
 ROWS_AT_ONCE = 200_000  # pairs of a beam and a facet that are looked at together
 
@@ -86,6 +89,10 @@ class Surfaces:
         within = ((antennas >= low) & (antennas <= high)).all(axis=1).any()
         return replace(self, closed=np.zeros_like(self.closed)) if within else self
 
+    def side(self, facets: np.ndarray, normal: np.ndarray) -> np.ndarray:
+        """1 (n,) where facets (n,) reflect on the side of their own normal, else 0; normal  on that side (n, 3)."""
+        return (dot(normal, self.normals[facets]) > 0).astype(np.int64)
+
     def facing(self, facets: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Unit normals (n, 3) of facets (n,) on the sides of places, m (n, 3); and whether these sides reflect (n,)."""
         normal = self.normals[facets]
@@ -113,11 +120,11 @@ class Beams:
     def __len__(self) -> int:
         return len(self.pulse)
 
-    def __getitem__(self, some: np.ndarray) -> Beams:
-        """Beams `some` (n,), in rising order."""
-        kept, chain = np.unique(self.chain[some], return_inverse=True)
-        chains, normals = self.chains[kept], self.normals[kept]
-        return Beams(chain, self.pulse[some], chains, normals, self.apex[some], self.polygons[some])
+    def __getitem__(self, rows: np.ndarray) -> Beams:
+        """Beams `rows` (n,), in rising order."""
+        old_chain, chain = np.unique(self.chain[rows], return_inverse=True)
+        chains, normals = self.chains[old_chain], self.normals[old_chain]
+        return Beams(chain, self.pulse[rows], chains, normals, self.apex[rows], self.polygons[rows])
 
     @property
     def order(self) -> int:
@@ -187,8 +194,8 @@ def reached(surfaces: Surfaces, beams: Beams, turn: float) -> tuple[np.ndarray, 
     image = mirrored(beams.apex[beams.first_of], normal, surfaces.centers[last])
     chain, facet = _reached(surfaces, last, *beams.bounds(beams.polygons), image, 2 * turn)
     height = dot3(surfaces.corners[facet] - surfaces.centers[last[chain], None], normal[chain])
-    some = height.max(axis=1, initial=-np.inf) > surfaces.on_plane
-    return chain[some], facet[some]
+    is_in_front = height.max(axis=1, initial=-np.inf) > surfaces.on_plane
+    return chain[is_in_front], facet[is_in_front]
 
 
 def _reached(
@@ -196,14 +203,14 @@ def _reached(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Pairs of a sphere on facet `last` (c,) and a facet in the cone from an image, m (c, 3), that may face it."""
     which, facet = surfaces.tree.within(_cones(center, radius, image, turn))
-    some = (facet != last[which]) & surfaces.mirrors[facet]
-    which, facet = which[some], facet[some]
-    some = np.ones(len(which), bool)
+    is_mirror = (facet != last[which]) & surfaces.mirrors[facet]
+    which, facet = which[is_mirror], facet[is_mirror]
+    may_face = np.ones(len(which), bool)
     for own, other in ((last[which], facet), (facet, last[which])):  # a corner of one is in front of the other
         height = dot3(surfaces.corners[other] - surfaces.centers[own, None], surfaces.normals[own])
         height = np.where(surfaces.two_sided[own, None], np.abs(height), height)
-        some &= folded(np.maximum, height) > surfaces.on_plane
-    return which[some], facet[some]
+        may_face &= folded(np.maximum, height) > surfaces.on_plane
+    return which[may_face], facet[may_face]
 
 
 def dot3(corners: np.ndarray, axis: np.ndarray) -> np.ndarray:
@@ -212,10 +219,17 @@ def dot3(corners: np.ndarray, axis: np.ndarray) -> np.ndarray:
 
 
 def extended(
-    surfaces: Surfaces, beams: Beams, chain: np.ndarray, facet: np.ndarray, rx: np.ndarray | None = None
+    surfaces: Surfaces,
+    beams: Beams,
+    chain: np.ndarray,
+    facet: np.ndarray,
+    rx: np.ndarray | None = None,
+    sides: np.ndarray | None = None,
 ) -> tuple[Beams, int]:
     """The beams after one facet more, without shadows, for pairs (p,) of a chain and a facet; and how many pairs of a
-    beam and a facet were looked at. rx  receivers, m (n_pulses, 3): only beams on facets that face them."""
+    beam and a facet were looked at. rx  receivers, m (n_pulses, 3): only beams on facets that face them
+    sides  (k, 2): only beams on these sides of facets, behind and in front
+    """
     image = mirrored(beams.apex, beams.normals[beams.chain, -1], surfaces.centers[beams.last])
     planes = beams.polygons.edge_planes(image)
     n_pairs, parts = 0, []
@@ -228,16 +242,18 @@ def extended(
         normal, reflects = surfaces.facing(target, image[row])
         if rx is not None:
             reflects &= faces(surfaces, target, normal, rx[beams.pulse[row]])
+        if sides is not None:
+            reflects &= sides[target, surfaces.side(target, normal)]
         reflects &= ~apart(surfaces.corners[target], planes[row], beams.polygons.corners[row])
-        some = np.flatnonzero(reflects)
-        row, place, target, normal = row[some], place[some], target[some], normal[some]
+        rows = np.flatnonzero(reflects)
+        row, place, target, normal = row[rows], place[rows], target[rows], normal[rows]
         polygons, last = surfaces.polygons[target], beams.last[row]
         side = beams.normals[beams.chain[row], -1]
         polygons = polygons.clipped(polygons.heights(side, surfaces.centers[last], surfaces.on_plane))
         polygons = polygons.seen_through(planes[row], beams.polygons.corners[row], surfaces.snap)
-        some = np.flatnonzero(polygons.area > LEAST_AREA * surfaces.areas[target])
-        key = 2 * place[some] + (dot(normal[some], surfaces.normals[target[some]]) > 0)
-        parts.append((key, row[some], target[some], normal[some], polygons[some]))
+        rows = np.flatnonzero(polygons.area > LEAST_AREA * surfaces.areas[target])
+        key = 2 * place[rows] + (dot(normal[rows], surfaces.normals[target[rows]]) > 0)
+        parts.append((key, row[rows], target[rows], normal[rows], polygons[rows]))
     if not parts:
         return beams[np.zeros(0, np.int64)], n_pairs
     key, row, target, normal = (np.concatenate([part[i] for part in parts]) for i in range(4))
@@ -250,7 +266,7 @@ def extended(
 
 def faces(surfaces: Surfaces, facets: np.ndarray, normal: np.ndarray, rx: np.ndarray) -> np.ndarray:
     """Whether receivers, m (n, 3), may see facets (n,) on the sides of normals (n, 3), edge-on too."""
-    return np.asarray(dot(normal, unit(rx - surfaces.centers[facets])) > -EDGE_ON)
+    return np.asarray(dot(normal, unit(rx - surfaces.centers[facets])) > -TURNED_AWAY)
 
 
 def in_blocks(number: np.ndarray, most: int = ROWS_AT_ONCE) -> list[slice]:

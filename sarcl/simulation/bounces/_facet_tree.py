@@ -65,10 +65,10 @@ class FacetTree:
     def within(self, cones: Cones) -> tuple[np.ndarray, np.ndarray]:
         """Pairs of a cone and a triangle that may lie in it (n,), (n,), in the order of the cones; MemoryError for too
         many."""
-        found, number = [], 0
+        pairs, number = [], 0
         for first in range(0, len(cones.radius), AT_ONCE):
-            found.append(self._some_within(cones, first))
-            number += len(found[-1][0])
+            pairs.append(self._pairs_within(cones, first))
+            number += len(pairs[-1][0])
             if number > MOST_PAIRS:
                 total = number / (first + AT_ONCE) * len(cones.radius)
                 raise MemoryError(
@@ -76,19 +76,19 @@ class FacetTree:
                     f"{PAIR_BYTES * total / 1e9:.0f} GB; take fewer bounces, a coarser mesh, or rough materials "
                     "(height inf) for what need not reflect to others"
                 )
-        if not found:
+        if not pairs:
             return np.zeros(0, np.int64), np.zeros(0, np.int64)
-        which, facet = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        which, facet = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
         return which, self._order[facet]
 
-    def _some_within(self, cones: Cones, first: int) -> tuple[np.ndarray, np.ndarray]:
+    def _pairs_within(self, cones: Cones, first: int) -> tuple[np.ndarray, np.ndarray]:
         number = min(AT_ONCE, len(cones.radius) - first)
         top = len(self._levels[-1][0])
         which, node = np.repeat(np.arange(first, first + number), top), np.tile(np.arange(top), number)
         for depth in range(len(self._levels) - 1, -1, -1):
             center, radius = self._levels[depth]
-            some = cones.meet(which, center[node], radius[node])
-            which, node = which[some], node[some]
+            is_near = cones.meet(which, center[node], radius[node])
+            which, node = which[is_near], node[is_near]
             if depth:
                 below = len(self._levels[depth - 1][0])
                 which = np.repeat(which, BRANCHES)

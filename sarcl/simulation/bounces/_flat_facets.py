@@ -1,7 +1,7 @@
-"""Fewer facets for the same waves: pairs of triangles of one plane, and bodies of which only the lit side shades.
+"""Fewer facets for the same waves: flat parts of a mesh, and bodies of which only the lit side shades.
 
-A beam is what a convex facet lights of the next one: two triangles that tile a convex quadrilateral reflect the field
-of one facet. Larger ones gain nothing: the shadows of a whole scene cut them into more parts than they replace.
+A beam is what a convex facet lights of the next one: triangles that tile a convex polygon reflect the field of one
+facet. A part that is convex as it is becomes one polygon, others grow over shared edges while they stay convex.
 """
 
 from __future__ import annotations
@@ -9,46 +9,158 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial import ConvexHull
 
-from ...base.vectors import cross, distinct, dot
+from ...base.vectors import cross, distinct, dot, unit
 from ...scattering.physical_optics import normals_and_areas
-from ._polygons import Polygons
+from ._polygons import Polygons, joined
 
 FLAT = 1e-9  # of the diagonal: corners nearer to a plane or a line lie in it
+ROUNDING = 1e-9  # relative, of areas, and rad, of directions
+LONGEST = 1 / 8  # of the diagonal: longer polygons are halved, since the shadows of many others cut them into parts
+FEW = 32  # polygons that are not halved
+MOST_CORNERS = 6  # of a polygon: all are stored with as many corners as the largest one
 
 
 def joined_facets(triangles: np.ndarray, groups: np.ndarray, diagonal: float) -> tuple[Polygons, np.ndarray]:
-    """Triangles, m (k, 3, 3), and convex quadrilaterals of two of them; and the first triangle of each (n,), rising.
+    """Triangles, m (k, 3, 3), joined to convex polygons; and the first triangle of each (n,), rising.
 
     groups  (k,) int: triangles of different groups are not joined
     """
+    edge, back = _flat_edges(triangles, groups, FLAT * diagonal)
+    size = len(triangles)
+    links = coo_array((np.ones(len(edge), bool), (edge // 3, back // 3)), shape=(size, size))
+    part = connected_components(links, directed=False)[1]
+    corners: dict[int, np.ndarray] = {}  # of the polygon whose first triangle this is
+    is_joined = np.zeros(size, bool)
+    order = np.argsort(part, kind="stable")
+    for members in np.split(order, np.flatnonzero(np.diff(part[order])) + 1):
+        if len(members) > 2 and (outline := _outline(triangles[members])) is not None:
+            corners[int(members[0])], is_joined[members] = outline, True
+    rest = ~is_joined[edge // 3]
+    corners |= _grown(triangles, is_joined, edge[rest], back[rest], FLAT * diagonal)
+    first = np.array(sorted(corners), np.int64)
+    count = np.array([len(corners[f]) for f in first.tolist()], np.int64)
+    size = max(3, int(count.max(initial=3)))
+    padded = [corners[f][np.where(np.arange(size) < len(corners[f]), np.arange(size), 0)] for f in first.tolist()]
+    return _tiles(Polygons(np.reshape(padded, (-1, size, 3)), count), first, diagonal)
+
+
+def _flat_edges(triangles: np.ndarray, groups: np.ndarray, flat: float) -> tuple[np.ndarray, np.ndarray]:
+    """Edges between triangles of one group and plane, each once, (n,), (n,) as of `_shared_edges`: the longest first,
+    since halves of rectangles meet there, and those of one direction together, which makes rows of a grid."""
     edge, back = _shared_edges(triangles)
-    some = edge < back
-    edge, back = edge[some], back[some]
+    is_first = edge < back
+    edge, back = edge[is_first], back[is_first]
     own, other = edge // 3, back // 3
-    begin, end = triangles[own, edge % 3], triangles[own, (edge + 1) % 3]
-    tip, far = triangles[own, (edge + 2) % 3], triangles[other, (back + 2) % 3]
     normal = normals_and_areas(triangles)[0]
-    across = far - tip
-    turns = [dot(cross(corner - tip, across), normal[own]) * side for corner, side in ((begin, 1), (end, -1))]
-    flat = FLAT * diagonal
-    fits = (np.abs(dot(across, normal[own])) <= flat) & (groups[own] == groups[other])
-    fits &= (dot(normal[own], normal[other]) > 0) & (np.minimum(*turns) > flat * np.linalg.norm(across, axis=1))
-    # the longest edges first: halves of rectangles meet there
-    order = np.flatnonzero(fits)[np.argsort(-np.linalg.norm(end - begin, axis=1)[fits], kind="stable")]
-    is_free, pairs = [True] * len(triangles), []
-    for pair, a, b in zip(order.tolist(), own[order].tolist(), other[order].tolist(), strict=True):
-        if is_free[a] and is_free[b]:
-            is_free[a] = is_free[b] = False
-            pairs.append(pair)
-    if not pairs:
-        return Polygons.of(triangles), np.arange(len(triangles))
-    corners = np.concatenate([triangles, triangles[:, :1]], axis=1)
-    corners[own[pairs]] = np.stack([end, tip, begin, far], axis=1)[pairs]
-    count = np.full(len(triangles), 3)
-    count[own[pairs]], count[other[pairs]] = 4, 0
-    rest = np.flatnonzero(count)
-    return Polygons(corners[rest], count[rest]), rest
+    across = triangles[other, (back + 2) % 3] - triangles[own, (edge + 2) % 3]
+    is_flat = (np.abs(dot(across, normal[own])) <= flat) & (groups[own] == groups[other])
+    edge, back = (numbers[is_flat & (dot(normal[own], normal[other]) > 0)] for numbers in (edge, back))
+    along = triangles[edge // 3, (edge + 1) % 3] - triangles[edge // 3, edge % 3]
+    length = np.linalg.norm(along, axis=1)
+    direction = along / length[:, None]
+    lead = np.take_along_axis(direction, np.abs(direction).round(6).argmax(axis=1)[:, None], axis=1)
+    keys = *(direction * np.sign(lead)).round(6).T, -(length / max(length.max(initial=0.0), 1e-300)).round(6)
+    order = np.lexsort(keys)
+    return edge[order], back[order]
+
+
+def _outline(triangles: np.ndarray) -> np.ndarray | None:
+    """Corners of the convex polygon that triangles of one plane, m (k, 3, 3), fill, m (n, 3); None where they fill
+    none of few corners."""
+    normal, area = normals_and_areas(triangles)
+    x = unit(triangles[0, 1] - triangles[0, 0])
+    places = triangles.reshape(-1, 3)
+    flat = (places - places[0]) @ np.stack([x, cross(normal[0], x)], axis=1)
+    hull = ConvexHull(flat)
+    if abs(hull.volume - area.sum()) > ROUNDING * hull.volume:
+        return None
+    ring = flat[hull.vertices]  # counterclockwise
+    before, after = ring - np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0) - ring
+    turn = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+    is_corner = turn > ROUNDING * np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
+    return np.asarray(places[hull.vertices[is_corner]]) if is_corner.sum() <= MOST_CORNERS else None
+
+
+def _grown(
+    triangles: np.ndarray, is_joined: np.ndarray, edges: np.ndarray, backs: np.ndarray, flat: float
+) -> dict[int, np.ndarray]:
+    """Corners of convex polygons that other triangles, m (k, 3, 3), are joined to over edges in this order, m (n, 3),
+    by their first triangle."""
+    places, corner = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
+    number = corner.reshape(-1, 3).tolist()
+    normal = normals_and_areas(triangles)[0]
+    rings = {k: number[k] for k in np.flatnonzero(~is_joined).tolist()}  # with corners at which they do not turn
+    turning = {k: set(ring) for k, ring in rings.items()}
+    root = list(range(len(triangles)))
+
+    def root_of(k: int) -> int:
+        while root[k] != k:
+            root[k] = root[root[k]]
+            k = root[k]
+        return k
+
+    def turn(before: int, at: int, after: int, k: int) -> float:
+        """Distance, m, by which a polygon turns left at a corner; negative: right."""
+        a, b = places[at] - places[before], places[after] - places[at]
+        size = float(np.sqrt(max(a @ a, b @ b)))
+        return float(normal[k] @ np.cross(a, b)) / size
+
+    pairs, is_growing = list(zip(edges.tolist(), backs.tolist(), strict=True)), True
+    while is_growing:
+        is_growing, open_pairs = False, []
+        for edge, back in pairs:
+            own, other = root_of(edge // 3), root_of(back // 3)
+            if own == other:
+                continue
+            open_pairs.append((edge, back))
+            begin, end = number[edge // 3][edge % 3], number[edge // 3][(edge + 1) % 3]
+            a, b = _from(rings[own], end), _from(rings[other], begin)  # from end to begin, and back
+            if a[-1] != begin or b[-1] != end:
+                continue
+            path = {begin, end}
+            while len(a) > 2 and len(b) > 2 and a[1] == b[-2]:
+                a, b = a[1:], b[:-1]
+                path.add(a[0])
+            while len(a) > 2 and len(b) > 2 and a[-2] == b[1]:
+                a, b = a[:-1], b[1:]
+                path.add(b[0])
+            turns = turn(a[-2], a[-1], b[1], own), turn(b[-2], b[-1], a[1], own)
+            corners = (turning[own] | turning[other]) - path
+            corners |= {at for at, by in zip((a[-1], b[-1]), turns, strict=True) if by > flat}
+            if min(turns) < -flat or len(corners) > MOST_CORNERS:
+                continue
+            first, second = min(own, other), max(own, other)
+            root[second], rings[first], turning[first] = first, a[:-1] + b[:-1], corners
+            del rings[second], turning[second]
+            is_growing = True
+        pairs = open_pairs
+    return {k: places[[at for at in ring if at in turning[k]]] for k, ring in rings.items()}
+
+
+def _tiles(polygons: Polygons, first: np.ndarray, diagonal: float) -> tuple[Polygons, np.ndarray]:
+    """Polygons of many, halved until none is long; and `first` of each (n,), rising."""
+    if len(polygons) <= FEW:
+        return polygons, first
+    parts, numbers = [], []
+    while len(polygons):
+        extent = np.ptp(polygons.corners, axis=1)
+        is_long = extent.max(axis=1) > LONGEST * diagonal
+        parts.append(polygons[~is_long])
+        numbers.append(first[~is_long])
+        polygons, first, axis = polygons[is_long], first[is_long], extent[is_long].argmax(axis=1)
+        places = polygons.corners[np.arange(len(first)), :, axis]
+        height = places - (places.max(axis=1) + places.min(axis=1))[:, None] / 2
+        polygons, first = joined([polygons.clipped(height), polygons.clipped(-height)]), np.tile(first, 2)
+    first = np.concatenate(numbers)
+    order = np.argsort(first, kind="stable")
+    return joined(parts)[order], first[order]
+
+
+def _from(ring: list[int], place: int) -> list[int]:
+    start = ring.index(place)
+    return ring[start:] + ring[:start]
 
 
 def closed(triangles: np.ndarray) -> np.ndarray:

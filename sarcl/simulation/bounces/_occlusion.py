@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...base.vectors import dot, unit
-from ._beams import LEAST_AREA, Beams, Surfaces, faces, in_blocks, mirrored
+from ._beams import LEAST_AREA, TURNED_AWAY, Beams, Surfaces, faces, first, in_blocks, mirrored
 from ._facet_tree import Cones
 from ._polygons import Polygons, Shadows, less_shadows
 
@@ -19,11 +19,29 @@ def lit(surfaces: Surfaces, beams: Beams, turn: float) -> tuple[Polygons, np.nda
 
     turn  rad: directions to two of the antennas' positions differ by no more
     """
-    pieces, of = beams.polygons, np.arange(len(beams))
+    rows = np.arange(len(beams))  # beams of which something is lit on the legs so far
+    pieces, of = beams.polygons, rows
     for leg, end, image, start in _legs(surfaces, beams):
-        chain, shapes = _between(surfaces, beams, leg, end, image, start, turn)
-        pieces, of = _less(surfaces, beams, pieces, of, beams.apex, chain, shapes)
+        lit_beams = beams[rows]
+        chain, shapes = _between(surfaces, lit_beams, leg, end[rows], image[rows], start[rows], turn)
+        place = np.searchsorted(rows, of)
+        pieces, place = _less(surfaces, lit_beams, pieces, place, lit_beams.apex, chain, shapes)
+        of = rows[place]
+        rows = np.unique(of)
     return pieces, of
+
+
+def sides_seen(surfaces: Surfaces, antennas: np.ndarray, turn: float) -> np.ndarray:
+    """Whether antennas, m (n, 3), may see facets on the side behind their normal and on that in front (k, 2)."""
+    out = np.zeros((len(surfaces.areas), 2), bool)
+    beams = first(surfaces, antennas, np.flatnonzero(surfaces.mirrors))
+    beams = beams[np.unique(lit(surfaces, beams, turn)[1])]
+    facet = beams.chains[:, 0]
+    out[facet, surfaces.side(facet, beams.normals[:, 0])] = True
+    for place in antennas:  # edge-on, where physical optics fades out
+        sine = dot(surfaces.normals, unit(place - surfaces.centers))
+        out[np.abs(sine) <= TURNED_AWAY] = True
+    return out
 
 
 def seen(
@@ -32,8 +50,8 @@ def seen(
     """What receivers, m (k, 3), see of pieces of beams `of` (n,): as `lit`."""
     if not len(beams):
         return pieces, of
-    some = np.flatnonzero(faces(surfaces, beams.last, beams.normals[beams.chain, -1], rx)[of])
-    pieces, of = pieces[some], of[some]
+    rows = np.flatnonzero(faces(surfaces, beams.last, beams.normals[beams.chain, -1], rx)[of])
+    pieces, of = pieces[rows], of[rows]
     start = Polygons(rx[:, None], np.ones(len(rx), np.int64))
     chain, shapes = _between(surfaces, beams, beams.order, beams.polygons, rx, start, turn, receives=True)
     sine = dot(beams.normals[beams.chain, -1], unit(rx - surfaces.centers[beams.last]))
@@ -55,16 +73,16 @@ def _less(
     has_pieces = np.bincount(of, minlength=len(beams)) > 0
     if casts is not None:
         has_pieces &= casts
-    falling = []
+    shadows = []
     number = np.diff(np.append(beams.first_of, len(beams)))[chain]
     for pairs in in_blocks(number):
         row, place = beams.rows_of(chain[pairs])
-        some = has_pieces[row]
-        row, place = row[some], place[some] + pairs.start
-        falling.append(Shadows.falling_on(beams.polygons, apex, row, shapes[place], least, surfaces.snap))
-    if not falling:
+        is_shaded = has_pieces[row]
+        row, place = row[is_shaded], place[is_shaded] + pairs.start
+        shadows.append(Shadows.falling_on(beams.polygons, apex, row, shapes[place], least, surfaces.snap))
+    if not shadows:
         return pieces, of
-    return less_shadows(pieces, of, Shadows.joined(falling), least, surfaces.snap)
+    return less_shadows(pieces, of, Shadows.joined(shadows), least, surfaces.snap)
 
 
 def _legs(surfaces: Surfaces, beams: Beams) -> Iterator[tuple[int, Polygons, np.ndarray, Polygons]]:
@@ -106,15 +124,15 @@ def _between(
     cones = Cones(center, unit(toward), radius, np.full(len(radius), np.tan(min(2 * turn, 1.5))), length)
     chain, occluder = surfaces.tree.within(cones)
     facets = beams.chains[:, leg - 1 : leg] if leg == 1 or receives else beams.chains[:, leg - 2 : leg]
-    some = (occluder[:, None] != facets[chain]).all(axis=1)
+    is_between = (occluder[:, None] != facets[chain]).all(axis=1)
     sine = dot(surfaces.normals[occluder], unit(image[beams.first_of[chain]] - surfaces.centers[occluder]))
-    some = np.flatnonzero(some & ((sine > -2 * turn - EDGE_ON) | ~surfaces.closed[occluder]))
-    chain, shapes = chain[some], surfaces.polygons[occluder[some]]
+    rows = np.flatnonzero(is_between & ((sine > -2 * turn - EDGE_ON) | ~surfaces.closed[occluder]))
+    chain, shapes = chain[rows], surfaces.polygons[occluder[rows]]
     for number in range(leg, leg - facets.shape[1], -1):  # in front of the facets where the leg ends and begins
         normal, point = beams.normals[chain, number - 1], surfaces.centers[beams.chains[chain, number - 1]]
         height = shapes.heights(normal, point, surfaces.on_plane)
-        some = np.flatnonzero(height.max(axis=1, initial=-np.inf) > 0)
-        chain, shapes = chain[some], shapes[some].clipped(height[some])
+        rows = np.flatnonzero(height.max(axis=1, initial=-np.inf) > 0)
+        chain, shapes = chain[rows], shapes[rows].clipped(height[rows])
     for number in range(leg, beams.order):
         normal, point = beams.normals[chain, number - 1], surfaces.centers[beams.chains[chain, number - 1]]
         shapes = Polygons(mirrored(shapes.corners, normal, point), shapes.count)

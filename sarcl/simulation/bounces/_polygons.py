@@ -28,8 +28,8 @@ class Polygons:
         """Polygons of n corners each, m (k, n, 3)."""
         return cls(corners, np.full(len(corners), corners.shape[1]))
 
-    def __getitem__(self, some: np.ndarray) -> Polygons:
-        return Polygons(self.corners[some], self.count[some])
+    def __getitem__(self, rows: np.ndarray) -> Polygons:
+        return Polygons(self.corners[rows], self.count[rows])
 
     @property
     def valid(self) -> np.ndarray:
@@ -61,18 +61,18 @@ class Polygons:
 
     def clipped(self, height: np.ndarray) -> Polygons:
         """The parts of which the height, (k, n) at the corners, is at least 0."""
-        outside = folded(np.minimum, height) < 0  # padding repeats a corner
-        rows = np.flatnonzero(outside)
-        count = np.where(outside, 0, self.count)
+        is_outside = folded(np.minimum, height) < 0  # padding repeats a corner
+        rows = np.flatnonzero(is_outside)
+        count = np.where(is_outside, 0, self.count)
         if not len(rows):
             return self
         corners, height, valid = self.corners[rows], height[rows], self.valid[rows]
         after, height_after = np.roll(corners, -1, axis=1), np.roll(height, -1, axis=1)
-        crosses = valid & (height * height_after < 0)
-        part = height / np.where(crosses, height - height_after, 1)
-        met = corners + part[..., None] * (after - corners)
-        both = np.stack([corners, met], axis=2).reshape(len(rows), -1, 3)
-        keep = np.stack([(height >= 0) & valid, crosses], axis=2).reshape(len(rows), -1)
+        is_crossing = valid & (height * height_after < 0)
+        part = height / np.where(is_crossing, height - height_after, 1)
+        crossing = corners + part[..., None] * (after - corners)
+        corners_and_crossings = np.stack([corners, crossing], axis=2).reshape(len(rows), -1, 3)
+        keep = np.stack([(height >= 0) & valid, is_crossing], axis=2).reshape(len(rows), -1)
         number = folded(np.add, keep.astype(np.int64))
         number[number < 3] = 0
         keep &= number[:, None] > 0
@@ -80,9 +80,9 @@ class Polygons:
         out = np.repeat(self.corners[:, :1], size, axis=1)
         n = min(size, self.corners.shape[1])
         out[:, :n] = self.corners[:, :n]
-        out[rows] = both[np.arange(len(rows)), keep.argmax(axis=1)][:, None]
+        out[rows] = corners_and_crossings[np.arange(len(rows)), keep.argmax(axis=1)][:, None]
         row, column = np.nonzero(keep)
-        out[rows[row], (np.cumsum(keep, axis=1) - 1)[row, column]] = both[row, column]
+        out[rows[row], (np.cumsum(keep, axis=1) - 1)[row, column]] = corners_and_crossings[row, column]
         count[rows] = number
         return Polygons(out, count)
 
@@ -144,8 +144,8 @@ class Shadows:
     corners: np.ndarray
     planes: np.ndarray
 
-    def __getitem__(self, some: np.ndarray) -> Shadows:
-        return Shadows(self.of[some], self.corners[some], self.planes[some])
+    def __getitem__(self, rows: np.ndarray) -> Shadows:
+        return Shadows(self.of[rows], self.corners[rows], self.planes[rows])
 
     @classmethod
     def joined(cls, parts: list[Shadows]) -> Shadows:
@@ -164,18 +164,18 @@ class Shadows:
         if not len(of):
             return cls(of, occluders.corners, occluders.corners)
         planes = polygons.edge_planes(apex)
-        some = np.flatnonzero(~apart(occluders.corners, planes[of], polygons.corners[of]))
-        of, occluders = of[some], occluders[some]
+        rows = np.flatnonzero(~apart(occluders.corners, planes[of], polygons.corners[of]))
+        of, occluders = of[rows], occluders[rows]
         away = polygons.center[of] - apex[of]  # nothing behind the apex casts a shadow
         front = occluders.clipped(occluders.heights(away, apex[of] + 1e-9 * away, 0.0))
-        some = np.flatnonzero(front.count > 0)
-        of, occluders = of[some], front[some]
+        rows = np.flatnonzero(front.count > 0)
+        of, occluders = of[rows], front[rows]
         planes = occluders.edge_planes(apex[of])
-        some = np.flatnonzero(~apart(polygons.corners[of], planes, occluders.corners))
-        out = cls(of[some], occluders.corners[some], planes[some])
+        rows = np.flatnonzero(~apart(polygons.corners[of], planes, occluders.corners))
+        out = cls(of[rows], occluders.corners[rows], planes[rows])
         area = polygons[out.of].seen_through(out.planes, out.corners, snap).area
-        some = np.flatnonzero(area > least[out.of])
-        return out[some[np.argsort(-area[some])]]
+        rows = np.flatnonzero(area > least[out.of])
+        return out[rows[np.argsort(-area[rows])]]
 
 
 def less_shadows(
@@ -189,12 +189,12 @@ def less_shadows(
     shadows = shadows[np.argsort(shadows.of, kind="stable")]
     number = np.bincount(shadows.of, minlength=len(least))
     owner, shadow = _repeated((np.cumsum(number) - number)[of], number[of])
-    done: list[tuple[Polygons, np.ndarray]] = []
+    unshaded: list[tuple[Polygons, np.ndarray]] = []
     while True:  # of each piece, the shadows that are still to be cut off, those first that came first
-        some = _near(pieces, owner, shadows, shadow)
-        owner, shadow = owner[some], shadow[some]
+        pairs = _near(pieces, owner, shadows, shadow)
+        owner, shadow = owner[pairs], shadow[pairs]
         number = np.bincount(owner, minlength=len(of))
-        done.append((pieces[number == 0], of[number == 0]))
+        unshaded.append((pieces[number == 0], of[number == 0]))
         shaded = np.flatnonzero(number)
         if not len(shaded):
             break
@@ -207,9 +207,9 @@ def less_shadows(
                 f"shadows cut what facets reflect to one another into more than {MOST_PIECES:,} parts at a time; take "
                 "fewer bounces or a coarser mesh"
             )
-    of = np.concatenate([owners for _, owners in done])
+    of = np.concatenate([owners for _, owners in unshaded])
     order = np.argsort(of, kind="stable")
-    return joined([part for part, _ in done])[order], of[order]
+    return joined([part for part, _ in unshaded])[order], of[order]
 
 
 def _repeated(start: np.ndarray, number: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -220,28 +220,28 @@ def _repeated(start: np.ndarray, number: np.ndarray) -> tuple[np.ndarray, np.nda
 
 def _near(pieces: Polygons, owner: np.ndarray, shadows: Shadows, shadow: np.ndarray) -> np.ndarray:
     """Pairs of a piece and a shadow (p,) that no plane of the shadow keeps apart."""
-    near = np.zeros(len(owner), bool)
+    is_near = np.zeros(len(owner), bool)
     for begin in range(0, len(owner), PAIRS_AT_ONCE):
         rows = slice(begin, begin + PAIRS_AT_ONCE)
-        near[rows] = ~apart(pieces.corners[owner[rows]], shadows.planes[shadow[rows]], shadows.corners[shadow[rows]])
-    return np.flatnonzero(near)
+        is_near[rows] = ~apart(pieces.corners[owner[rows]], shadows.planes[shadow[rows]], shadows.corners[shadow[rows]])
+    return np.flatnonzero(is_near)
 
 
 def _cut_once(pieces: Polygons, shadows: Shadows, least: np.ndarray, snap: float) -> tuple[Polygons, np.ndarray]:
     """Pieces less one shadow each, larger than `least`, m^2 (n,); and of which piece each is a part."""
-    inner, before = pieces, []
+    inner, inner_parts = pieces, []
     for edge in range(shadows.planes.shape[1]):
         height = inner.heights(shadows.planes[:, edge], shadows.corners[:, edge], snap)
-        before.append((inner, height))
+        inner_parts.append((inner, height))
         inner = inner.clipped(height)
-    falls = inner.area > least
-    some = np.flatnonzero(~falls)
-    parts, owners = [pieces[some]], [some]
-    for edge, (inner, height) in enumerate(before):
+    is_shaded = inner.area > least
+    rows = np.flatnonzero(~is_shaded)
+    parts, owners = [pieces[rows]], [rows]
+    for edge, (inner, height) in enumerate(inner_parts):
         is_edge = folded(np.logical_or, shadows.planes[:, edge] != 0)
-        some = np.flatnonzero(falls & is_edge & (folded(np.minimum, height) < 0))
-        part = inner[some].clipped(-height[some])
-        large = part.area > least[some]
-        parts.append(part[large])
-        owners.append(some[large])
+        rows = np.flatnonzero(is_shaded & is_edge & (folded(np.minimum, height) < 0))
+        part = inner[rows].clipped(-height[rows])
+        is_large = part.area > least[rows]
+        parts.append(part[is_large])
+        owners.append(rows[is_large])
     return joined(parts), np.concatenate(owners)

@@ -34,10 +34,10 @@ def nodes_for(excursion: np.ndarray, error: float, extra: int) -> np.ndarray:
     """Nodes that interpolate exp(j x) over |x| <= excursion, rad (n,), to an error; `extra` more for other factors."""
     out = np.full(len(excursion), 3)
     for _ in range(200):
-        few = 4 * (np.e * excursion / (2 * out)) ** out > error
-        if not few.any():
+        is_coarse = 4 * (np.e * excursion / (2 * out)) ** out > error
+        if not is_coarse.any():
             break
-        out[few] += 1
+        out[is_coarse] += 1
     steps = np.where(out < 12, 1, np.where(out < 32, 4, 16))  # few groups of triangles
     return np.asarray(-(-out // steps) * steps + extra)
 
@@ -53,23 +53,23 @@ def add(
     """Add triangles to samples complex128 (rows, n_pol, n_f): `nodes` (n,) of each; error  relative."""
     kernel = next((k for taps in TAPS if (k := interpolator_float64(taps, OVERSAMPLE)).error <= error), None)
     for number in np.unique(nodes).tolist():
-        some = np.flatnonzero(nodes == number)
+        facets = np.flatnonzero(nodes == number)
         if kernel is None or 2 * number >= len(frequencies):
             step = max(1, AT_ONCE // len(frequencies))
-            for first in range(0, len(some), step):
-                _add_directly(samples, frequencies, delays, amplitudes, some[first : first + step])
+            for first in range(0, len(facets), step):
+                _add_directly(samples, frequencies, delays, amplitudes, facets[first : first + step])
         else:
             step = max(1, AT_ONCE // number)
-            for first in range(0, len(some), step):
-                _add_by_profiles(samples, frequencies, delays, amplitudes, some[first : first + step], number, kernel)
+            for first in range(0, len(facets), step):
+                _add_by_profiles(samples, frequencies, delays, amplitudes, facets[first : first + step], number, kernel)
 
 
 def _add_directly(
-    samples: np.ndarray, frequencies: np.ndarray, delays: Delays, amplitudes: Amplitudes, some: np.ndarray
+    samples: np.ndarray, frequencies: np.ndarray, delays: Delays, amplitudes: Amplitudes, facets: np.ndarray
 ) -> None:
-    values = amplitudes(some, frequencies)
-    values *= np.exp(-2j * np.pi * (delays.delay[some, None] * frequencies % 1))[..., None]
-    rows = delays.row[some]
+    values = amplitudes(facets, frequencies)
+    values *= np.exp(-2j * np.pi * (delays.delay[facets, None] * frequencies % 1))[..., None]
+    rows = delays.row[facets]
     order = np.argsort(rows, kind="stable")
     rows = rows[order]
     starts = np.flatnonzero(np.append(True, rows[1:] != rows[:-1]))
@@ -81,21 +81,22 @@ def _add_by_profiles(
     frequencies: np.ndarray,
     delays: Delays,
     amplitudes: Amplitudes,
-    some: np.ndarray,
+    facets: np.ndarray,
     number: int,
     kernel: Interpolator,
 ) -> None:
     """As `_add_directly`, at evenly spaced frequencies, with amplitudes at `number` nodes, spread by a kernel."""
     n_rows, _, n = samples.shape
     length = int(2 * np.ceil(OVERSAMPLE * n / 2))
-    places = delays.delay[some] * (frequencies[1] - frequencies[0]) * length
+    places = delays.delay[facets] * (frequencies[1] - frequencies[0]) * length
     first = np.floor(places - kernel.taps / 2).astype(np.int64) + 1
     weights = kernel.weights(places - first - (kernel.taps - 1) / 2)
-    index = delays.row[some, None] * length + (first[:, None] + np.arange(kernel.taps)) % length
+    index = delays.row[facets, None] * length + (first[:, None] + np.arange(kernel.taps)) % length
     centre, width = (frequencies[0] + frequencies[-1]) / 2, frequencies[-1] - frequencies[0]
     nodes = chebyshev(centre, width, number)
     values = (
-        amplitudes(some, nodes) * np.exp(-2j * np.pi * (delays.delay[some] * frequencies[n // 2] % 1))[:, None, None]
+        amplitudes(facets, nodes)
+        * np.exp(-2j * np.pi * (delays.delay[facets] * frequencies[n // 2] % 1))[:, None, None]
     )
     basis = lagrange(nodes, frequencies)
     offset = np.arange(n) - n // 2

@@ -11,6 +11,7 @@ import numpy as np
 
 from ...base.boxes import box
 from ...base.constants import SPEED_OF_LIGHT
+from ...base.errors import warn
 from ...base.stage_timer import Clock
 from ...numerics.polynomials import chebyshev, lagrange
 from ...scene.scene import Scene
@@ -21,12 +22,16 @@ from ._amplitudes import Coatings, Facets
 from ._beams import Beams, Surfaces
 from ._flat_facets import closed, joined_facets
 from ._polygons import Polygons
+from ._weak_beams import bounds, strong
 
 PULSES_AT_ONCE, BEAMS_AT_ONCE = 128, 60_000  # pulses of a block, and pairs of these and facets that reflect to others
 MOST_TURN = 0.05  # rad, by which directions to antennas differ within a block
-CURVATURE = 1.0  # rad over the tolerance: phase of the wave's curvature over a triangle
+WEAK = 0.1  # of the tolerance: sum of the bounds of beams that are left out
+CURVATURE = 0.9  # rad over the tolerance: phase of the wave's curvature over a triangle; the rest is for weak beams
 DIRECTION = 0.5  # rad over the root of the tolerance: by which directions change over a triangle
 PROFILES = 1 / 300  # of the tolerance: error of sums over frequencies
+MANY = 30  # facets that a beam may reach, on average, from which on shadows on single facets are looked at first
+NARROW = 0.5  # share of the area in facets narrower than a wavelength from which on there is a warning
 NODES = 6  # frequencies at which matrices of dispersive materials are computed
 
 
@@ -72,6 +77,13 @@ class BounceScene:
         flags = surfaces.two_sided[some], surfaces.mirrors[some], surfaces.closed[some]
         return Surfaces(polygons, *flags), coatings
 
+    def narrow_share(self, wavelength: float) -> float:
+        """Share of the area that reflects to others in facets narrower than a wavelength, m, once flat parts are
+        joined."""
+        polygons = self.joined[0].polygons[self.joined[0].mirrors]
+        area, length = polygons.area, 2 * polygons.spheres[1]
+        return float(area[area < wavelength * length].sum() / area.sum())
+
     @cached_property
     def mirrors(self) -> np.ndarray:
         """Numbers of the facets that reflect."""
@@ -83,6 +95,7 @@ class BounceSpreader:
     receiver sees, by physical optics on that facet.
 
     predicted_error  relative to these echoes at random phases
+    narrow           share of the area in facets narrower than a wavelength
     """
 
     def __init__(self, scene: BounceScene, view: ChannelView) -> None:
@@ -91,10 +104,19 @@ class BounceSpreader:
         surfaces, self._coatings = scene.joined
         antennas = np.concatenate([view.antennas.tx, view.antennas.rx]) - scene.origin
         self._surfaces = surfaces.seen_from(antennas)
+        wavelength = SPEED_OF_LIGHT / float(np.median(view.frequencies))
+        self.narrow = scene.narrow_share(wavelength)
+        if self.narrow > NARROW:
+            warn(
+                f"mesh too fine for bounces={scene.bounces}: {self.narrow:.0%} of the reflecting area is in facets "
+                f"narrower than the wavelength, {wavelength:.2g} m, whose waves spread more than those of geometrical "
+                "optics; take a coarser mesh of curved parts (flat ones are joined), or a higher frequency",
+                "narrow facets",
+            )
 
     def describe(self) -> dict[str, Any]:
         """Words and numbers for a report."""
-        return {"bounces": self.scene.bounces}
+        return {"facets narrower than a wavelength": f"{self.narrow:.0%} of the area"} if self.narrow > NARROW else {}
 
     def add(
         self, samples: np.ndarray, pulses: Sequence[int], clock: Clock, on_progress: Callable[[int], object]
@@ -137,37 +159,64 @@ class BounceSpreader:
         if len(facets) * len(pulses) > BEAMS_AT_ONCE and half:
             (a, counts), (b, more) = (self.values(p, frequencies, exact=exact) for p in (pulses[:half], pulses[half:]))
             return np.concatenate([a, b]), counts + more
-        for beams, pieces, of, n_pairs in self._lit_beams(_beams.first(surfaces, tx, facets), rx, turn):
+        power = np.zeros(len(pulses))
+
+        def followed(beams: Beams) -> tuple[Beams, Counts]:
+            return self._followed(beams, frequencies, np.zeros(len(pulses)) if exact else power)
+
+        for beams, pieces, of, part in self._lit_beams(facets, tx, rx, turn, followed):
             outside, late, latest, seen = 0, 0.0, -np.inf, np.bincount(of, minlength=len(beams)) > 0
             if len(of):
                 triangles = self._facets(beams, pieces, of, rx)
                 inside = self._inside(triangles, pulses)
                 outside = int(seen.sum()) - len(np.unique(triangles.of[inside]))
-                self._add(out, pulses, frequencies, triangles.chosen(inside), exact)
+                echo = np.zeros_like(out)
+                self._add(echo, pulses, frequencies, triangles.chosen(inside), exact)
+                power += (np.abs(echo) ** 2).sum(axis=1).mean(axis=1)
+                out += echo
                 if outside:
                     late, latest = self._late(triangles, np.setdiff1d(triangles.of, triangles.of[inside]), pulses)
             done = int(seen.sum()) - outside
-            counts += Counts(
-                n_pairs, outside, unseen=n_pairs - outside - done, orders=(0,) * (beams.order - 1) + (done,),
-                late=late, latest=latest,
-            )  # fmt: skip
+            unseen = part.pairs - part.weak - outside - done
+            orders = (0,) * (beams.order - 1) + (done,)
+            counts += part + Counts(0, outside, unseen=unseen, orders=orders, late=late, latest=latest)
         return out, counts
 
     def _lit_beams(
-        self, beams: Beams, rx: np.ndarray, turn: float
-    ) -> Iterator[tuple[Beams, Polygons, np.ndarray, int]]:
+        self,
+        facets: np.ndarray,
+        tx: np.ndarray,
+        rx: np.ndarray,
+        turn: float,
+        followed: Callable[[Beams], tuple[Beams, Counts]],
+    ) -> Iterator[tuple[Beams, Polygons, np.ndarray, Counts]]:
         """Beams of each order from 2 on, their pulses counted from 0, what receivers, m (n, 3), see of them, the beam
-        of each piece, and the number of pairs of beam and facet that were looked at; beams  of the first order."""
+        of each piece, and the pairs of beam and facet that were looked at, and left out before their shadows.
+
+        facets  the first ones of beams;  followed  the beams that are, before their shadows are cut
+        """
         surfaces = self._surfaces
+        beams, lit = _beams.first(surfaces, tx, facets), None
         for number in range(2, self.scene.bounces + 1):
             if not len(beams):
                 return
-            last = rx if number == self.scene.bounces else None
-            beams, n_pairs = _beams.extended(surfaces, beams, *_beams.reached(surfaces, beams, turn), last)
+            pairs, sides = _beams.reached(surfaces, beams, turn), None
+            is_last = number == self.scene.bounces
+            if len(pairs[0]) > MANY * len(beams.chains):  # what is in shadow is worth knowing before
+                if number == 2:
+                    lit = _occlusion.sides_seen(surfaces, tx, turn)
+                    facet, normal = beams.chains[:, 0], beams.normals[:, 0]
+                    beams = beams[np.flatnonzero(lit[facet, surfaces.side(facet, normal)][beams.chain])]
+                    pairs = _beams.reached(surfaces, beams, turn)
+                if is_last:
+                    is_same = lit is not None and np.array_equal(tx, rx)
+                    sides = lit if is_same else _occlusion.sides_seen(surfaces, rx, turn)
+            beams, n_pairs = _beams.extended(surfaces, beams, *pairs, rx if is_last else None, sides)
+            beams, part = followed(beams)
             pieces, of = _occlusion.lit(surfaces, beams, turn)
             arrives = np.bincount(of, minlength=len(beams)) > 0
             beams, of = beams[np.flatnonzero(arrives)], (np.cumsum(arrives) - 1)[of]
-            yield beams, *_occlusion.seen(surfaces, beams, pieces, of, rx[beams.pulse], turn), n_pairs
+            yield beams, *_occlusion.seen(surfaces, beams, pieces, of, rx[beams.pulse], turn), part + Counts(n_pairs)
 
     def _turn(self, antennas: np.ndarray) -> float:
         """Angle, rad, by which directions from any facet to antennas, m (n, 3), differ from those to the middle one."""
@@ -201,6 +250,14 @@ class BounceSpreader:
             )
         of = np.concatenate(numbers)
         return Facets(np.concatenate(parts), beams[of], rx[beams.pulse[of]], of)
+
+    def _followed(self, beams: Beams, frequencies: np.ndarray, power: np.ndarray) -> tuple[Beams, Counts]:
+        """Beams less weak ones of the last order, and how many these are. power  m^2 (n,), of the orders before."""
+        number = len(beams)
+        if beams.order == self.scene.bounces and power.any() and not self.view.weights.is_needed:
+            bound = bounds(beams, self._coatings, frequencies, len(self.view.polarizations))
+            beams = beams[strong(bound, beams.pulse, WEAK * self.scene.tolerance * np.sqrt(power))]
+        return beams, Counts(0, weak=number - len(beams))
 
     def _inside(self, facets: Facets, pulses: np.ndarray) -> np.ndarray:
         """Numbers of the triangles inside the range window."""

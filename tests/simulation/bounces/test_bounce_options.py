@@ -145,3 +145,14 @@ def test_sums_by_range_profiles_are_those_at_single_frequencies():
     assert raw.n_samples > 60  # far more than nodes over the band
     assert raw.report.measured_error is not None
     assert raw.report.measured_error <= raw.report.predicted_error
+
+
+def test_weak_reflections_are_left_out_and_counted():
+    rough = sarcl.Material(3.0, height=0.025)
+    scene = sarcl.Scene.facets(CORNER, material=[0, 0, 1], materials=["metal", rough])
+    coarse, fine, two = (echo(scene, bounces=n, tolerance=t) for n, t in ((3, 1e-2), (3, 1e-5), (2, 1e-2)))
+    # the third reflection alone is weak: where the rough plate comes before the last one
+    assert coarse.report.contributions_skipped["weak reflections"] == 4 * len(TRACK)
+    assert fine.report.contributions_skipped["weak reflections"] == 0
+    assert two.report.contributions_skipped["weak reflections"] == 0
+    assert np.linalg.norm(coarse.samples - fine.samples) <= 1e-2 * np.linalg.norm(fine.samples)

@@ -78,3 +78,83 @@ def test_nothing_outside_is_lit_from_inside_a_body():
     scene = sarcl.Scene.facets(np.concatenate([halves(PLATES), body]), two_sided=np.repeat([True, False], (4, 12)))
     with pytest.raises(NothingSeen):  # but the walls about the antenna, outside the range window
         echo(scene)
+
+
+def grid(corner: tuple[float, float, float], u: np.ndarray, v: np.ndarray, n: int) -> np.ndarray:
+    """n x n x 2 triangles of a parallelogram at a corner."""
+    i, j = (k.ravel() for k in np.meshgrid(np.arange(n), np.arange(n)))
+    at = [
+        np.array(corner) + np.outer(a / n, u) + np.outer(b / n, v)
+        for a, b in ((i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1))
+    ]
+    return halves(np.stack(at, axis=1))
+
+
+def dihedral_cut(n: int, cells: slice = slice(None)) -> sarcl.Scene:
+    """The dihedral, its ground of n x n squares, of which `cells` are there, and its wall of n x n."""
+    x, y, z = np.eye(3)
+    ground = grid((0, 0, 0), x, y, n).reshape(-1, 2, 3, 3)[cells].reshape(-1, 3, 3)
+    return sarcl.Scene.facets(np.concatenate([ground, grid((0, 0, 0), y, z, n)]))
+
+
+def test_a_finely_cut_dihedral_reflects_as_one_of_two_facets():
+    whole, fine = echo(sarcl.Scene.facets(halves(PLATES))), echo(dihedral_cut(24))
+    assert number_of_two(fine) == number_of_two(whole) == 2
+    assert np.linalg.norm(fine.samples - whole.samples) <= 1e-3 * np.linalg.norm(whole.samples)
+
+
+def test_flat_parts_with_a_hole_or_t_junctions_are_joined_to_few_facets():
+    n = 8
+    hole = np.setdiff1d(np.arange(n * n), np.add.outer(n * np.arange(2, 5), np.arange(3, 6)))
+    fine, single = dihedral_cut(n, hole), dihedral_cut(n, hole).triangles.copy()
+    single += 1e-6 * np.random.default_rng(1).normal(size=single.shape)  # not flat: nothing is joined
+    joined, apart = echo(fine), echo(sarcl.Scene.facets(single))
+    assert number_of_two(joined) <= 2 * 6 < number_of_two(apart)
+    assert np.linalg.norm(joined.samples - apart.samples) <= 1e-2 * np.linalg.norm(apart.samples)
+    # a vertex within an edge of a larger triangle: areas are counted once
+    wall = np.concatenate(
+        [grid((0, 0, 0), np.array([0, 1, 0]), np.array([0, 0, 0.5]), 3), halves(PLATES[1:]) * (1, 1, 0.5) + (0, 0, 0.5)]
+    )
+    steps = echo(sarcl.Scene.facets(np.concatenate([halves(PLATES[:1]), wall])))
+    assert np.linalg.norm(steps.samples - echo(sarcl.Scene.facets(halves(PLATES))).samples) <= 1e-2 * np.linalg.norm(
+        steps.samples
+    )
+
+
+def test_a_mesh_of_facets_narrower_than_a_wavelength_is_said():
+    bent = dihedral_cut(40).triangles + 0.0
+    bent[..., 2] += 0.05 * bent[..., 0] ** 2
+    with pytest.warns(
+        sarcl.SarclWarning, match=r"mesh too fine for bounces=2: .* narrower than the wavelength.*coarser"
+    ):
+        raw = echo(sarcl.Scene.facets(bent))
+    assert "of the area" in str(raw.report.plan["facets narrower than a wavelength"])
+
+
+@pytest.mark.parametrize("bounces", [2, 3])
+def test_shadows_on_single_facets_looked_at_first_change_nothing(bounces, monkeypatch):
+    rng = np.random.default_rng(7)
+    triangles = np.concatenate(
+        [halves(PLATES), 0.5 + rng.uniform(-0.4, 0.4, (24, 1, 3)) + rng.uniform(-0.2, 0.2, (24, 3, 3))]
+    )
+    scene = sarcl.Scene.facets(triangles, two_sided=rng.random(len(triangles)) < 0.7)
+    samples, receiver = [], sarcl.Trajectory(None, np.array([[900, 300, 1.1e3]]))
+    for many in (0, 1000):
+        monkeypatch.setattr("sarcl.simulation.bounces.bounce_spreader.MANY", many)
+        samples += [
+            sarcl.echo(
+                scene, CHIRP, LOOK, receiver=other, bounces=bounces, reference=(0.5, 0.5, 0.5), range_window=(-9, 9),
+                tolerance=1e-2, check=False,
+            ).samples
+            for other in (None, receiver)
+        ]  # fmt: skip
+    for first, second in zip(samples[:2], samples[2:], strict=True):
+        assert np.linalg.norm(first - second) <= 1e-6 * np.linalg.norm(second)
+
+
+def test_too_many_pairs_of_facets_are_refused_with_a_remedy(monkeypatch):
+    monkeypatch.setattr("sarcl.simulation.bounces._facet_tree.MOST_PAIRS", 2)
+    with pytest.raises(
+        MemoryError, match=r"may reflect to one another in about .* ways.*fewer bounces, a coarser mesh"
+    ):
+        echo(sarcl.Scene.facets(halves(PLATES)))

@@ -75,7 +75,7 @@ def check(
         assert error <= raw.report.predicted_error <= tolerance
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, 2, 43])  # 43: a receiver almost in the plane of a last facet
 def test_a_random_room_is_within_the_tolerance(seed):
     check(*room(seed), TOLERANCES)
 
@@ -86,7 +86,7 @@ def test_closed_bodies_on_ground_are_within_the_tolerance(seed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(3, 53))
+@pytest.mark.parametrize("seed", range(3, 81))
 def test_random_rooms_are_within_every_tolerance(seed):
     check(*room(seed), TOLERANCES)
 
