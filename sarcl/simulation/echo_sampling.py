@@ -23,6 +23,7 @@ from ..scene.scene import Scene
 SOME_PULSES = 33  # at which the error of the receiver's positions over the scene is computed
 DEEPEST = -12e3  # m: lower than any ground, the bottom of the sea included
 WIDE = -1e-6  # cosine of the bistatic angle below which forward scatter matters; 90 deg itself is not beyond
+WIDEST = 1e8  # m about the reference: farther than from a geostationary orbit to the far side of the Earth
 LEAST_SAMPLES = 64  # in the default range window, so that a single point has a profile, too
 
 
@@ -145,6 +146,11 @@ def window(
         if pair.shape != (2,):
             raise ValueError(f"range_window is {asked!r}; give (near, far) in metres about the reference")
         finite("range_window", pair)
+        if np.abs(pair).max() > WIDEST:
+            raise ValueError(
+                f"range_window reaches {np.abs(pair).max():g} m; windows about the reference lie within {WIDEST:g} m: "
+                "give (near, far) in metres"
+            )
         if not pair[0] < pair[1]:
             raise ValueError(f"range_window ({pair[0]:g}, {pair[1]:g}) is empty; near must be less than far")
         return float(pair[0]), float(pair[1])
