@@ -155,7 +155,8 @@ class Material:
             gigahertz = frequency / 1e9
             losses = self.conductivity * gigahertz**power_of_losses / (2 * np.pi * VACUUM_PERMITTIVITY * frequency)
             values = self.eps_r * gigahertz**power - 1j * losses
-            self._warn_outside(float(frequency.min()), float(frequency.max()))
+            if frequency.size:
+                self._warn_outside(float(frequency.min()), float(frequency.max()))
         return np.asarray(values)[()]
 
     def _warn_outside(self, low: float, high: float) -> None:

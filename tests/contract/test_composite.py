@@ -48,6 +48,7 @@ def track(n=24):
     [(12, True), *(pytest.param(*values, marks=pytest.mark.slow) for values in ((12, False), (20, True)))],
 )
 @pytest.mark.filterwarnings("ignore:mesh too coarse")  # the capsule
+@pytest.mark.filterwarnings("ignore:point_roughness moves posts")
 def test_culling_changes_a_whole_scene_by_less_than_the_tolerance(half, shadows):
     scene, tolerance = composite(half), 1e-3
     options = {

@@ -356,6 +356,8 @@ MAY_CATCH = {
     "io/input_paths.py": "names that no system takes",
     "io/_gotcha.py": "scipy's reader of damaged files; the file is put before a message, which is raised again",
     "io/_checksums.py": "text that is no JSON",
+    "io/cphd/_signal_rows.py": "the library and file objects, which fail in many ways",
+    "io/cphd/_reading.py": "the library, lxml and text that is no number",
     "io/labelled_files.py": "readers of damaged files, of xarray, zarr and h5py",
     "io/meshes/_gltf_checks.py": "text that is no JSON",
     "io/meshes/_text.py": "text that is no UTF-8 and no numbers",

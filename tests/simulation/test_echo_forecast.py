@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +14,8 @@ import sarcl
 from sarcl.base.errors import NothingSeen
 from sarcl.base.report import root_sum_square
 from sarcl.simulation import scene_plan, scene_preparation
+from sarcl.simulation.bounces import bounce_spreader
+from sarcl.simulation.edges import edge_echoes
 
 CHIRP = sarcl.Waveform.chirp(center=9.6e9, bandwidth=150e6, duration=1e-6)
 TRACK = sarcl.Trajectory.circle(radius=800.0, height=600.0, arc=0.02, n_pulses=48, prf=100.0)
@@ -169,10 +172,8 @@ def test_a_forecast_times_other_pulses_only_where_nothing_is_seen(monkeypatch):
 @pytest.mark.parametrize("options", [{"bounces": 4}, {"edges": True}])
 def test_a_scene_that_is_not_prepared_has_the_seconds_of_reflections_and_edges(options, monkeypatch):
     """By a clock of contributions: it stands still but for these, whose pairs it counts."""
-    from sarcl.simulation import _echo_forecast as forecasts
-
     room = sarcl.shapes.plate((3, 3)) + sarcl.shapes.plate((3, 3), position=(0, 1.5, 1.5), rotation=(np.pi / 2, 0, 0))
-    kind = forecasts.BounceSpreader if "bounces" in options else forecasts.EdgeEchoes
+    kind = bounce_spreader.BounceSpreader if "bounces" in options else edge_echoes.EdgeEchoes
     clock, added = [0.0], kind.add
 
     def add(self, samples, pulses, *others):
@@ -180,6 +181,6 @@ def test_a_scene_that_is_not_prepared_has_the_seconds_of_reflections_and_edges(o
         return added(self, samples, pulses, *others)
 
     monkeypatch.setattr(kind, "add", add)
-    monkeypatch.setattr(forecasts.time, "perf_counter", lambda: clock[0])
+    monkeypatch.setattr(time, "perf_counter", lambda: clock[0])
     one, more = (forecast(UNPREPARED, room, CHIRP, TRACK, tolerance=0.1, **o) for o in ({}, options))
     assert more.seconds - one.seconds == pytest.approx(0.5 * len(TRACK) + 2.0, abs=1.0)
