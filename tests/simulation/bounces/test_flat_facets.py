@@ -131,6 +131,23 @@ def test_a_mesh_of_facets_narrower_than_a_wavelength_is_said():
     assert "of the area" in str(raw.report.plan["facets narrower than a wavelength"])
 
 
+def test_what_is_at_the_edge_of_a_beam_shades_it_at_all_pulses_of_a_block():
+    """Posts beside a dihedral, whose shadows move over it between pulses that are looked at together."""
+    rng, n = np.random.default_rng(5), 40
+    posts = np.concatenate(
+        [
+            block(tuple(p), tuple(np.add(p, (0.02, 0.02, 0.5))))
+            for p in rng.uniform((0, 0, 0.1), (1.2, 1.2, 0.5), (n, 3))
+        ]
+    )
+    scene = sarcl.Scene.facets(np.concatenate([halves(PLATES), posts]), two_sided=np.repeat([True, False], (4, 12 * n)))
+    angle = np.linspace(-0.02, 0.02, 5)
+    places = 1e3 * np.stack([np.cos(angle), 0.04 + np.sin(angle), 1 + 0 * angle], axis=1)
+    together = echo(scene, sarcl.Trajectory(np.arange(5) / 100, places)).samples
+    apart = [echo(scene, sarcl.Trajectory(None, place[None])).samples for place in places]
+    assert np.linalg.norm(together - np.concatenate(apart)) <= 1e-6 * np.linalg.norm(together)
+
+
 @pytest.mark.parametrize("bounces", [2, 3])
 def test_shadows_on_single_facets_looked_at_first_change_nothing(bounces, monkeypatch):
     rng = np.random.default_rng(7)
