@@ -80,6 +80,14 @@ def test_nothing_outside_is_lit_from_inside_a_body():
         echo(scene)
 
 
+def test_a_room_of_two_sided_facets_reflects_to_an_antenna_within():
+    room = sarcl.Scene.facets(block((-8, -8, -8), (9, 9, 9)), two_sided=True)
+    wave = sarcl.Waveform.chirp(center=100e6, bandwidth=5e6, duration=1e-6)
+    track = sarcl.Trajectory(None, np.array([[0.4, 0.3, 0.2]]))
+    options = {"reference": (0.5, 0.5, 0.5), "range_window": (-1, 30), "tolerance": 1e-1, "check": False}
+    assert number_of_two(sarcl.echo(room, wave, track, bounces=2, **options)) > 0
+
+
 def grid(corner: tuple[float, float, float], u: np.ndarray, v: np.ndarray, n: int) -> np.ndarray:
     """n x n x 2 triangles of a parallelogram at a corner."""
     i, j = (k.ravel() for k in np.meshgrid(np.arange(n), np.arange(n)))
