@@ -83,11 +83,14 @@ class Surfaces:
         return SNAP * self.diagonal
 
     def seen_from(self, antennas: np.ndarray) -> Surfaces:
-        """These facets for antennas, m (n, 3): bodies that may hold one of them shade from within, as open ones do."""
+        """These facets for antennas, m (n, 3): bodies that may hold one of them shade from within, as open ones do;
+        others are dark within, whether their facets have two sides or one."""
         corners = self.corners[self.closed].reshape(-1, 3)
         low, high = corners.min(axis=0, initial=np.inf), corners.max(axis=0, initial=-np.inf)
         within = ((antennas >= low) & (antennas <= high)).all(axis=1).any()
-        return replace(self, closed=np.zeros_like(self.closed)) if within else self
+        if within:
+            return replace(self, closed=np.zeros_like(self.closed))
+        return replace(self, two_sided=self.two_sided & ~self.closed)
 
     def side(self, facets: np.ndarray, normal: np.ndarray) -> np.ndarray:
         """1 (n,) where facets (n,) reflect on the side of their own normal, else 0; normal  on that side (n, 3)."""

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from ...base.morton import morton_order
+from ._polygons import folded
 
 BRANCHES = 8  # spheres that the sphere above them holds
 AT_ONCE = 20_000  # cones that are looked at together
@@ -51,8 +52,10 @@ class FacetTree:
     @cached_property
     def _levels(self) -> list[tuple[np.ndarray, np.ndarray]]:
         """Centres and radii of the spheres of each level, from the triangles up."""
-        center = (self._triangles.min(axis=1) + self._triangles.max(axis=1)) / 2
-        levels = [(center, np.linalg.norm(self._triangles - center[:, None], axis=-1).max(axis=1))]
+        corners = self._triangles.swapaxes(1, 2)
+        center = (folded(np.minimum, corners) + folded(np.maximum, corners)) / 2
+        away = np.sqrt(folded(np.add, (self._triangles - center[:, None]) ** 2))
+        levels = [(center, folded(np.maximum, away))]
         while len(levels[-1][0]) > BRANCHES:
             center, radius = levels[-1]
             starts = np.arange(0, len(center), BRANCHES)

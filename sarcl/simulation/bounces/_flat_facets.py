@@ -13,7 +13,7 @@ from scipy.spatial import ConvexHull
 
 from ...base.vectors import cross, distinct, dot, unit
 from ...scattering.physical_optics import normals_and_areas
-from ._polygons import Polygons, joined
+from ._polygons import Polygons, folded, joined
 
 FLAT = 1e-9  # of the diagonal: corners nearer to a plane or a line lie in it
 ROUNDING = 1e-9  # relative, of areas, and rad, of directions
@@ -43,7 +43,7 @@ def joined_facets(triangles: np.ndarray, groups: np.ndarray, diagonal: float) ->
     count = np.array([len(corners[f]) for f in first.tolist()], np.int64)
     size = max(3, int(count.max(initial=3)))
     padded = [corners[f][np.where(np.arange(size) < len(corners[f]), np.arange(size), 0)] for f in first.tolist()]
-    return _tiles(Polygons(np.reshape(padded, (-1, size, 3)), count), first, diagonal)
+    return Polygons(np.reshape(padded, (-1, size, 3)), count), first
 
 
 def _flat_edges(triangles: np.ndarray, groups: np.ndarray, flat: float) -> tuple[np.ndarray, np.ndarray]:
@@ -139,23 +139,25 @@ def _grown(
     return {k: places[[at for at in ring if at in turning[k]]] for k, ring in rings.items()}
 
 
-def _tiles(polygons: Polygons, first: np.ndarray, diagonal: float) -> tuple[Polygons, np.ndarray]:
-    """Polygons of many, halved until none is long; and `first` of each (n,), rising."""
+def tiles(polygons: Polygons, first: np.ndarray, diagonal: float) -> tuple[Polygons, np.ndarray]:
+    """Polygons of many, halved until none is long; and `first` of each (n,)."""
     if len(polygons) <= FEW:
         return polygons, first
-    parts, numbers = [], []
+    parts: list[Polygons] = []
+    numbers: list[np.ndarray] = []
     while len(polygons):
-        extent = np.ptp(polygons.corners, axis=1)
-        is_long = extent.max(axis=1) > LONGEST * diagonal
+        corners = polygons.corners.swapaxes(1, 2)
+        extent = folded(np.maximum, corners) - folded(np.minimum, corners)
+        is_long = folded(np.maximum, extent) > LONGEST * diagonal
+        if not is_long.any() and not parts:
+            return polygons, first
         parts.append(polygons[~is_long])
         numbers.append(first[~is_long])
         polygons, first, axis = polygons[is_long], first[is_long], extent[is_long].argmax(axis=1)
         places = polygons.corners[np.arange(len(first)), :, axis]
         height = places - (places.max(axis=1) + places.min(axis=1))[:, None] / 2
         polygons, first = joined([polygons.clipped(height), polygons.clipped(-height)]), np.tile(first, 2)
-    first = np.concatenate(numbers)
-    order = np.argsort(first, kind="stable")
-    return joined(parts)[order], first[order]
+    return joined(parts), np.concatenate(numbers)
 
 
 def _from(ring: list[int], place: int) -> list[int]:

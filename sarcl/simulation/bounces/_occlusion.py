@@ -6,12 +6,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...base.vectors import dot, unit
+from ...base.vectors import cross, dot, unit
 from ._beams import LEAST_AREA, TURNED_AWAY, Beams, Surfaces, faces, first, in_blocks, mirrored
 from ._facet_tree import Cones
-from ._polygons import Polygons, Shadows, less_shadows
+from ._polygons import PAIRS_AT_ONCE, Polygons, Shadows, folded, less_shadows
 
 EDGE_ON = 1e-6  # sine below which an antenna that is edge-on to a facet casts no shadows on it
+DIRECTIONS = 6  # across a leg, in which the outlines of beams and of what may lie in their way are compared
 
 
 def lit(surfaces: Surfaces, beams: Beams, turn: float) -> tuple[Polygons, np.ndarray]:
@@ -123,6 +124,8 @@ def _between(
     length = length + radius + beams.bounds(start)[1]
     cones = Cones(center, unit(toward), radius, np.full(len(radius), np.tan(min(2 * turn, 1.5))), length)
     chain, occluder = surfaces.tree.within(cones)
+    rows = np.flatnonzero(_overlap(beams, end, cones, surfaces.corners, chain, occluder, surfaces.snap))
+    chain, occluder = chain[rows], occluder[rows]
     facets = beams.chains[:, leg - 1 : leg] if leg == 1 or receives else beams.chains[:, leg - 2 : leg]
     is_between = (occluder[:, None] != facets[chain]).all(axis=1)
     sine = dot(surfaces.normals[occluder], unit(image[beams.first_of[chain]] - surfaces.centers[occluder]))
@@ -137,3 +140,38 @@ def _between(
         normal, point = beams.normals[chain, number - 1], surfaces.centers[beams.chains[chain, number - 1]]
         shapes = Polygons(mirrored(shapes.corners, normal, point), shapes.count)
     return chain, shapes
+
+
+def _overlap(
+    beams: Beams, end: Polygons, cones: Cones, corners: np.ndarray, chain: np.ndarray, facet: np.ndarray, snap: float
+) -> np.ndarray:
+    """Whether facets (n,) with corners, m (k, 3, 3), may shade the polygons at the end of a leg of all beams of chains
+    (n,), as seen along the axes of cones about these: their outlines are compared in a few directions across the axis.
+
+    A line from a point p of a polygon to an antenna at a goes through (1 - s) p + s a, 0 < s < 1, which is no farther
+    from the axis than p, but for the angle between the axis and the way to a.
+    """
+    first = np.eye(3)[np.abs(cones.axis).argmin(axis=1)]
+    x = unit(cross(cones.axis, first))
+    y = cross(cones.axis, x)
+    angle = np.arange(DIRECTIONS) * np.pi / DIRECTIONS
+    frame = np.concatenate(
+        [np.cos(angle)[:, None] * x[:, None] + np.sin(angle)[:, None] * y[:, None], cones.axis[:, None]], axis=1
+    )
+
+    def extent(places: np.ndarray, of: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        along = np.matmul(frame[of], (places - cones.center[of, None]).swapaxes(1, 2))
+        return folded(np.minimum, along), folded(np.maximum, along)
+
+    low, high = extent(end.corners, beams.chain)
+    low = np.minimum(np.minimum.reduceat(low, beams.first_of), 0.0)
+    high = np.maximum(np.maximum.reduceat(high, beams.first_of), 0.0)
+    out = np.zeros(len(chain), bool)
+    for begin in range(0, len(chain), PAIRS_AT_ONCE):
+        rows = slice(begin, begin + PAIRS_AT_ONCE)
+        of = chain[rows]
+        least, most = extent(corners[facet[rows]], of)
+        slack = cones.widening[of] * np.maximum(most[:, -1] + cones.radius[of], 0) + snap
+        is_apart = (least > high[of] + slack[:, None]) | (most < low[of] - slack[:, None])
+        out[rows] = ~folded(np.logical_or, is_apart[:, :-1])
+    return out

@@ -20,8 +20,8 @@ from ..spreading import ChannelView, Counts
 from . import _beams, _occlusion, _sums
 from ._amplitudes import Coatings, Facets
 from ._beams import Beams, Surfaces
-from ._flat_facets import closed, joined_facets
-from ._polygons import Polygons
+from ._flat_facets import closed, joined_facets, tiles
+from ._polygons import Polygons, joined
 from ._weak_beams import bounds, strong
 
 PULSES_AT_ONCE, BEAMS_AT_ONCE = 128, 60_000  # pulses of a block, and pairs of these and facets that reflect to others
@@ -31,6 +31,7 @@ CURVATURE = 0.9  # rad over the tolerance: phase of the wave's curvature over a 
 DIRECTION = 0.5  # rad over the root of the tolerance: by which directions change over a triangle
 PROFILES = 1 / 300  # of the tolerance: error of sums over frequencies
 MANY = 30  # facets that a beam may reach, on average, from which on shadows on single facets are looked at first
+MOST_SHADING = 20_000  # facets that only cast shadows, from which on joining them would take longer than it saves
 NARROW = 0.5  # share of the area in facets narrower than a wavelength from which on there is a warning
 NODES = 6  # frequencies at which matrices of dispersive materials are computed
 
@@ -66,11 +67,15 @@ class BounceScene:
 
     @cached_property
     def joined(self) -> tuple[Surfaces, Coatings]:
-        """These facets, pairs of triangles of one plane and material joined where together they are convex."""
+        """These facets, triangles of one plane and material joined where together they are convex."""
         surfaces, coatings = self.surfaces, self.coatings
+        joins = surfaces.mirrors | ((~surfaces.mirrors).sum() <= MOST_SHADING)
+        some, single = np.flatnonzero(joins), np.flatnonzero(~joins)
         alike = coatings.material, coatings.reflectivity, coatings.height, surfaces.two_sided, surfaces.mirrors
-        groups = np.unique(np.stack(alike, axis=1), axis=0, return_inverse=True)[1].ravel()
-        polygons, some = joined_facets(surfaces.corners, groups, surfaces.diagonal)
+        groups = np.unique(np.stack([values[some] for values in alike], axis=1), axis=0, return_inverse=True)[1].ravel()
+        polygons, first = joined_facets(surfaces.corners[some], groups, surfaces.diagonal)
+        polygons = joined([polygons, surfaces.polygons[single]]) if len(single) else polygons
+        polygons, some = tiles(polygons, np.append(some[first], single), surfaces.diagonal)
         coatings = Coatings(
             coatings.material[some], coatings.materials, coatings.reflectivity[some], coatings.height[some]
         )

@@ -80,6 +80,14 @@ def test_nothing_outside_is_lit_from_inside_a_body():
         echo(scene)
 
 
+def test_a_room_of_two_sided_facets_reflects_to_an_antenna_within():
+    room = sarcl.Scene.facets(block((-8, -8, -8), (9, 9, 9)), two_sided=True)
+    wave = sarcl.Waveform.chirp(center=100e6, bandwidth=5e6, duration=1e-6)
+    track = sarcl.Trajectory(None, np.array([[0.4, 0.3, 0.2]]))
+    options = {"reference": (0.5, 0.5, 0.5), "range_window": (-1, 30), "tolerance": 1e-1, "check": False}
+    assert number_of_two(sarcl.echo(room, wave, track, bounces=2, **options)) > 0
+
+
 def grid(corner: tuple[float, float, float], u: np.ndarray, v: np.ndarray, n: int) -> np.ndarray:
     """n x n x 2 triangles of a parallelogram at a corner."""
     i, j = (k.ravel() for k in np.meshgrid(np.arange(n), np.arange(n)))
@@ -129,6 +137,23 @@ def test_a_mesh_of_facets_narrower_than_a_wavelength_is_said():
     ):
         raw = echo(sarcl.Scene.facets(bent))
     assert "of the area" in str(raw.report.plan["facets narrower than a wavelength"])
+
+
+def test_what_is_at_the_edge_of_a_beam_shades_it_at_all_pulses_of_a_block():
+    """Posts beside a dihedral, whose shadows move over it between pulses that are looked at together."""
+    rng, n = np.random.default_rng(5), 40
+    posts = np.concatenate(
+        [
+            block(tuple(p), tuple(np.add(p, (0.02, 0.02, 0.5))))
+            for p in rng.uniform((0, 0, 0.1), (1.2, 1.2, 0.5), (n, 3))
+        ]
+    )
+    scene = sarcl.Scene.facets(np.concatenate([halves(PLATES), posts]), two_sided=np.repeat([True, False], (4, 12 * n)))
+    angle = np.linspace(-0.02, 0.02, 5)
+    places = 1e3 * np.stack([np.cos(angle), 0.04 + np.sin(angle), 1 + 0 * angle], axis=1)
+    together = echo(scene, sarcl.Trajectory(np.arange(5) / 100, places)).samples
+    apart = [echo(scene, sarcl.Trajectory(None, place[None])).samples for place in places]
+    assert np.linalg.norm(together - np.concatenate(apart)) <= 1e-6 * np.linalg.norm(together)
 
 
 @pytest.mark.parametrize("bounces", [2, 3])
