@@ -134,8 +134,8 @@ class ThinSheets:
         return slab(cosine[:, None], eps, material.thickness * frequencies / SPEED_OF_LIGHT)[2:]
 
     def steepness(self, centers: np.ndarray, antennas: np.ndarray, frequencies: np.ndarray) -> float:
-        """Change of T per angle of incidence relative to |T|, at least FAINT, 1/rad, of lines of sight from antennas, m (n, 3), to
-        facets about `centers`, m (k, 3): the largest of each sheet, and their sum."""
+        """Change of T per angle of incidence relative to |T|, at least FAINT, 1/rad: the largest of each sheet, and
+        their sum, of lines of sight from antennas, m (n, 3), to facets about `centers`, m (k, 3)."""
         sight, total = unit(centers - antennas[:, None]), 0.0
         for sheet, normal in enumerate(self.normals):
             angle = np.arccos(np.minimum(np.abs(sight @ normal), 1.0))

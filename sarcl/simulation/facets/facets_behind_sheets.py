@@ -61,16 +61,17 @@ class FacetsBehindSheets:
             return None
         sheets = ThinSheets.of(scene, ends)
         room: dict[str, Any] = {"max_bytes": request.budget / 4, "progress": partial(request.report, "shadows")}
-        given = FacetPieces.uncut(scene.triangles, scene.two_sided)
-        shaded = LitParts(request.device, given, scene.triangles[scene.sheets], ends, **room)
-        behind = (shaded.dark | shaded.partly) & (scene.reflectivity > 0)
-        if (behind & random(scene)).any():
+        wanted = pieces.scene.reflectivity > 0
+        each = FacetPieces(pieces.scene.triangles, pieces.scene.two_sided, wanted, scene.triangles, pieces.of)
+        shaded = LitParts(request.device, each, scene.triangles[scene.sheets], ends, **room)
+        rows = np.flatnonzero(shaded.dark | shaded.partly)
+        is_random = random(scene)[pieces.of[rows]]
+        if is_random.any():
             raise NotApplicable(
-                f"facet {int(np.argmax(behind & random(scene)))} lies behind a thin sheet and has a random echo "
+                f"facet {int(pieces.of[rows[np.argmax(is_random)]])} lies behind a thin sheet and has a random echo "
                 "(roughness, or a diagram of its material), which is not computed through sheets: give it roughness=0 "
                 "and a smooth material, or leave the sheet out"
             )
-        rows = np.flatnonzero(behind[pieces.of])
         if not len(rows):
             return None
         looks = seen.antennas.tx[spread_over(len(seen.antennas), LOOKS)]
