@@ -146,7 +146,8 @@ TRACK = sarcl.Trajectory.line(start=(-1e3, -2, 800), velocity=(0, 10, 0), prf=10
 ASIDE = sarcl.Trajectory.line(start=(-1e3, 90, 800), velocity=(0, 10, 0), prf=10.0, n_pulses=4)
 CHIRP = sarcl.Waveform.chirp(center=5e9, bandwidth=100e6, duration=1e-6)
 HOUSE = shapes.plate((1, 1), material=GLASS) + shapes.plate((1, 1), position=(0, 0, -1))
-ROUGH = replace(HOUSE, roughness=np.array([0, 0, 0.01, 0.01]))
+BEHIND = shapes.plate((1, 1), material=GLASS) + shapes.plate((1, 1), position=(1.25, 0, -1))
+ROUGH = replace(BEHIND, roughness=np.array([0, 0, 0.01, 0.01]))
 BAD = {
     "negative": (lambda: sarcl.Material(3, thickness=-1), "thickness is -1 m; it cannot be negative"),
     "of a conductor": (lambda: sarcl.Material(thickness=0.01), "thickness is 0.01 m of a perfect conductor"),
