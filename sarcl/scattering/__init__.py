@@ -17,6 +17,7 @@ For other folders:
     rough_pieces           rough facets cut on a device, where the kernels read the pieces
     scatterers             from a scene to the points and facets that the kernels add
     subdivision            facets cut to the edge length of their plan
+    thin_sheets            what is seen through thin sheets, and how much they let through
     mesh_quality/          warnings about meshes that are too coarse for their curves or for speckle
 
 For this folder alone:

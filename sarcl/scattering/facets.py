@@ -284,7 +284,7 @@ class FacetSet:
         sheet, (r_h, r_v) = thickness > 0, fresnel(cosine, eps)
         if not sheet.any():
             return r_h, r_v, None
-        of_h, of_v, *through = slab(cosine, np.where(sheet, eps, 2), thickness * wave)
+        of_h, of_v, *through = slab(cosine, np.where(sheet, eps, 2 - 1j), np.where(sheet, thickness, 1.0) * wave)
         return np.where(sheet, of_h, r_h), np.where(sheet, of_v, r_v), [np.where(sheet, t, 0) for t in through]
 
     def planes(self, order: np.ndarray, nodes: np.ndarray, metal: bool, dispersive: bool) -> np.ndarray:

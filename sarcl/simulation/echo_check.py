@@ -15,6 +15,7 @@ from ..scattering.scatterers import Points
 from .bounces.bounce_spreader import BounceScene, BounceSpreader
 from .edges.edge_echoes import EdgeEchoes
 from .facets.exact_facets import facet_samples, inside_window
+from .facets.facets_behind_sheets import SheetEchoes
 from .scene_echoes import SceneEchoes
 from .spreading import ChannelView
 
@@ -108,6 +109,9 @@ def exact(
         if part is not None:
             value, power = _exact(part, view, pulse)
             values, powers = values + value, powers + power
+    if scene.behind_sheets is not None:
+        value, power, _ = SheetEchoes(scene.behind_sheets, view, 0).exactly(pulse)
+        values, powers = values + value, powers + power
     if scene.edges is not None:
         for _, value, power in EdgeEchoes(scene.edges, view).exactly(np.array([pulse]), frequencies):
             values, powers = values + value[0], powers + power[0]

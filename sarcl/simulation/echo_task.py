@@ -12,11 +12,12 @@ from ..base.validation import instance
 from ..model.antenna import Antenna
 from ..model.trajectory import Trajectory
 from ..model.waveform import Waveform
+from ..numerics.pulse_geometry import PulseGeometry
 from ..opencl.device import Device
 from ..scattering import antenna_weights
 from ..scattering.antenna_weights import AntennaWeights
 from ..scattering.facet_kinds import random
-from ..scattering.mesh_quality.facet_groups import coplanar_groups
+from ..scattering.thin_sheets import ThinSheets, may_hide
 from ..scene.scene import Scene
 from . import echo_sampling
 from .echo_options import EchoOptions
@@ -73,14 +74,13 @@ def echo_task(scene: Scene, waveform: Waveform, track: Trajectory, options: Echo
     # before the range window: rough terrain moves its corners
     real = scene.realized(request.seed).at_frequency(waveform.center)
     if len(real.triangles):
-        if options.shadows:
-            refuse_hidden_by_sheets(real)
         if options.bounces > 1 and real.sheets.any():
             raise NotApplicable(
                 f"bounces is {options.bounces}, and the scene has thin sheets (a material with a thickness), of which "
                 "single reflections alone are computed: give bounces=1, or materials without thickness"
             )
         tx, rx = sends.positions, echo_sampling.receiver_positions(sends, hears)
+        refuse_with_sheets(options, real, PulseGeometry(tx, rx).ends)
         refuse_inside(real, *([tx] if hears is None else [tx, rx]))
         warn_of_coincident(scene)
         if options.forward and not np.array_equal(tx, rx):
@@ -103,12 +103,18 @@ def echo_task(scene: Scene, waveform: Waveform, track: Trajectory, options: Echo
     )
 
 
-def refuse_hidden_by_sheets(scene: Scene) -> None:
-    """NotApplicable where facets may lie behind thin sheets, through which echoes are not computed."""
-    if scene.sheets.any() and coplanar_groups(scene, np.arange(len(scene.triangles)), random(scene)).any():
+def refuse_with_sheets(options: EchoOptions, scene: Scene, ends: list[np.ndarray]) -> None:
+    """NotApplicable where facets may lie behind thin sheets, and echoes through these are not computed with what is
+    asked for."""
+    if not options.shadows or not may_hide(scene):
+        return
+    ThinSheets.of(scene, ends)
+    others = (("an array", options.array is not None), ("edges=True", options.edges))
+    names = [name for name, is_given in others if is_given]
+    if names:
         raise NotApplicable(
-            "the scene has thin sheets (a material with a thickness), and echo does not compute what is seen through "
-            "them; use rcs, which does, or give shadows=False where nothing lies behind them"
+            f"the scene has thin sheets (a material with a thickness), and what lies behind them is not computed with "
+            f"{names[0]}: leave it out, or give shadows=False where nothing lies behind them"
         )
 
 

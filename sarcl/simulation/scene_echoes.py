@@ -25,13 +25,14 @@ from .edges.edge_echoes import EdgeEchoes, PreparedEdges
 from .facets.exact_facets import ExactFacets
 from .facets.facet_method import facet_echoes
 from .facets.facet_spreading import FacetSpreader, TiledFacets
+from .facets.facets_behind_sheets import FacetsBehindSheets, SheetEchoes
 from .factorized.spreader import FactorizedSpreader
 from .points.direct import PointSpreader
 from .points.point_plan import PointPlan, PreparedPoints
 from .scene_plan import NODES, model_words
 from .spreading import Band, ChannelView, Counts
 
-Spreader = FacetSpreader | ExactFacets | FactorizedSpreader | BounceSpreader | EdgeEchoes
+Spreader = FacetSpreader | ExactFacets | FactorizedSpreader | BounceSpreader | EdgeEchoes | SheetEchoes
 UNKNOWN_SHADOWS = {"shadow edges": "sampled, not part of the error"}  # for the report
 
 
@@ -50,6 +51,7 @@ class SceneEchoes:
     shadow_terms           errors of shadows that are counted in samples, relative to the norm of the facets
     edges                  edges that diffract, None where none are asked for
     bounced                facets that reflect to one another, None where a single reflection counts
+    behind_sheets          facets that are seen through thin sheets, None where none are
     """
 
     request: EchoRequest
@@ -67,10 +69,12 @@ class SceneEchoes:
     n_pulses: int
     edges: PreparedEdges | None = None
     bounced: BounceScene | None = None
+    behind_sheets: FacetsBehindSheets | None = None
 
     def __len__(self) -> int:
-        """Number of points, facets and pieces of edges."""
-        return sum(len(part) for part in (self.points, *self.facets, self.edges) if part is not None)
+        """Number of points, facets, pieces of edges and facets that are seen through sheets."""
+        parts = (self.points, *self.facets, self.edges, self.behind_sheets)
+        return sum(len(part) for part in parts if part is not None)
 
     @property
     def shadow_words(self) -> dict[str, Any]:
@@ -161,11 +165,19 @@ class SceneEchoes:
             leveled = plan.factorized_spreader(request.device, self.points, view, nodes, request.same, request.budget)
             spreaders += [] if leveled is None else [leveled]
             parts.append((ErrorTerm("points", plan.predicted_error + error, SMALLER_TOLERANCE), plan.describe()))
+        hidden, seen_through = 0.0, dict[str, Any]()
+        if self.behind_sheets is not None:
+            behind = SheetEchoes(self.behind_sheets, view, first)
+            spreaders.append(behind)
+            hidden, seen_through = self.behind_sheets.error, behind.describe()
+            if not self.facets:
+                parts.append((ErrorTerm("facets", hidden, SMALLER_TOLERANCE), seen_through | self.mesh_warnings))
         if self.subdivision is not None and self.subdivision.plan.is_float64:
             for facets in self.facets:
                 exact = ExactFacets(facets.within(first, stop, self.n_pulses), self.subdivision.plan, view)
-                words = exact.describe() | self.mesh_warnings | self.shadow_words
-                error = self.subdivision.plan.gain * exact.predicted_error
+                words = exact.describe() | self.mesh_warnings | self.shadow_words | seen_through
+                # each relative to the norm of the facets that it adds: not more of all of them
+                error = max(self.subdivision.plan.gain * exact.predicted_error, hidden)
                 parts.append((ErrorTerm("facets", error, SMALLER_TOLERANCE), words))
                 spreaders.append(exact)
         spread = []

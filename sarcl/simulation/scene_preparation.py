@@ -25,6 +25,7 @@ from .bounces.bounce_spreader import BounceScene
 from .echo_request import EchoRequest
 from .edges.edge_echoes import PreparedEdges
 from .facets.facet_spreading import TiledFacets
+from .facets.facets_behind_sheets import FacetsBehindSheets
 from .points.point_plan import PreparedPoints
 from .scene_echoes import SceneEchoes
 from .scene_plan import SHADOWS, ScenePlan, parts_of, samples_shadows, with_clipped_shadows
@@ -63,6 +64,7 @@ def _prepared(plan: ScenePlan, *, tiled: bool, exact: bool) -> SceneEchoes:
         weights = weights.culled(UNSEEN * plan.error_budget / plan.weight_error.peak_to_rms, seen.waveform)
     points, skipped = points_of(seen.scene, request.skips, len(seen.antennas))
     facets, subdivision, mesh_warnings = tuple[FacetSet, ...](), plan.subdivision, dict[str, Any]()
+    behind: FacetsBehindSheets | None = None
     if subdivision is not None:
         subdivision, cut = subdivision.apply(seen.scene, request.seed)
         cells, represents = cut.sampled_cells(speckle_contrast.SAMPLED)
@@ -87,8 +89,11 @@ def _prepared(plan: ScenePlan, *, tiled: bool, exact: bool) -> SceneEchoes:
             progress=request.report,
         )
         skipped = {why: skipped.get(why, 0) + n for why, n in left_out.items()}
+        behind = FacetsBehindSheets.of(request, seen, cut.host, subdivision.plan, plan.error_budget)
+        if behind is not None:
+            skipped["shadowed"] -= behind.n_dark * len(seen.antennas)
     bounced = BounceScene.of(seen.scene, request.bounces, plan.error_budget)
-    if bounced is None:
+    if bounced is None and behind is None:
         _check_left(request, points, facets, skipped)
     if points is not None:
         bounded(points.largest() * weights.peak)
@@ -107,6 +112,7 @@ def _prepared(plan: ScenePlan, *, tiled: bool, exact: bool) -> SceneEchoes:
         error_budget=plan.error_budget,
         shadow_terms=_shadow_terms(request, seen.scene, facets),
         bounced=bounced,
+        behind_sheets=behind,
         n_pulses=len(seen.antennas),
         edges=PreparedEdges.of(request, seen),
     )

@@ -15,6 +15,7 @@ from ...numerics.pulse_geometry import PulseGeometry
 from ...scattering.facet_plan import FacetPlan
 from ...scattering.facets import FacetSet, Light
 from ...scattering.physical_optics import lit_share, turned
+from ...scattering.thin_sheets import FacetsThrough
 from ...scene.triangles import centroids, normals
 from ..spreading import ChannelView, Counts
 
@@ -73,7 +74,7 @@ def inside_window(part: FacetSet, antennas: PulseGeometry, pulse: int) -> np.nda
 
 
 def facet_samples(
-    part: FacetSet, view: ChannelView, pulse: int, inside: np.ndarray, light: Light
+    part: FacetSet | FacetsThrough, view: ChannelView, pulse: int, inside: np.ndarray, light: Light
 ) -> tuple[np.ndarray, np.ndarray]:
     """Samples (n_polarizations, n) of a pulse at the n frequencies of a channel, and their power at random phases.
 

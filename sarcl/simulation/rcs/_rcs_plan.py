@@ -19,7 +19,7 @@ from ...numerics.pulse_geometry import PulseGeometry
 from ...opencl.memory_budget import budget
 from ...scattering.facets import POLARIZATIONS, FacetSet, Light
 from ...scattering.mesh_quality import facet_error
-from ...scattering.mesh_quality.facet_groups import coplanar_groups
+from ...scattering.thin_sheets import SeenThrough, ThinSheets, may_hide
 from ...scene.triangles import centroids, normals
 from ...visibility.lit_parts import FacetPieces, LitParts
 from ..echo_check import exact_light
@@ -27,7 +27,6 @@ from ..echo_sampling import warn_of_wide_angles
 from ..scene_defects import warn_of_coincident
 from ._beyond_single import add_beyond_single_reflections, seconds_beyond, terms_beyond
 from ._rcs_task import UP, RcsTask
-from ._screens import Screens
 
 # Distance of the antennas from the scene, over its size: directions differ over the scene by the inverse, and float64
 # resolves them to 1e-16 at any distance
@@ -91,7 +90,7 @@ class RcsPlan:
         task = self.task
         out = np.zeros((len(task.to_tx), len(task.frequencies), len(task.polarizations)), np.complex128)
         self._add_points(out)
-        if task.options.check and self._screens is not None:
+        if task.options.check and self._sheets is not None:
             raise NotApplicable("check=True has no second way to compute what thin sheets let through; leave it out")
         part = self._facets()
         if part is not None:
@@ -129,16 +128,16 @@ class RcsPlan:
         return [self._place(u) for u in self.task.ends]
 
     @cached_property
-    def _screens(self) -> Screens | None:
-        """Thin sheets that facets may be seen through; None: there are none, or nothing else."""
+    def _sheets(self) -> tuple[ThinSheets, SeenThrough] | None:
+        """Thin sheets, and what is seen through them; None: there are none, or nothing else."""
         task, scene = self.task, self.task.scene
-        if not self._may_shade or not scene.sheets.any():
-            return None
-        if not coplanar_groups(scene, np.arange(len(scene.triangles)), np.zeros(len(scene.triangles), bool)).any():
+        if not self._may_shade or not may_hide(scene):
             return None
         keep, device = np.flatnonzero(scene.reflectivity > 0), task.device
-        max_bytes = budget(device, task.options.max_bytes)
-        return Screens.of(scene, keep, self._antennas, device, max_bytes, self._progress("shadows"))
+        sheets, pieces = ThinSheets.of(scene, self._antennas), scene.triangles[keep]
+        facets, max_bytes = FacetPieces.uncut(pieces, scene.two_sided[keep]), budget(device, task.options.max_bytes)
+        parts = sheets.lit_parts(facets, self._antennas, device, max_bytes, self._progress("shadows"))
+        return sheets, SeenThrough(pieces, parts)
 
     def _facets(self) -> FacetSet | None:
         """The facets that reflect, with what the directions see of them."""
@@ -147,7 +146,7 @@ class RcsPlan:
         if not len(keep):
             return None
         lit_parts, rows = None, None
-        if self._may_shade and self._screens is None:
+        if self._may_shade and self._sheets is None:
             forward = task.options.forward
             pieces = FacetPieces.uncut(scene.triangles[keep], scene.two_sided[keep], forward=forward)
             lit_parts = LitParts(
@@ -195,22 +194,24 @@ class RcsPlan:
                 light = part.light(first, [end[first : rows.stop] for end in ends], waves)
                 for p in rows:
                     seen = Light(light.index, light.share[p - first :][:1], light.mean[p - first :][:1])
-                    if self._screens is None:
+                    if self._sheets is None:
                         out[p, band] += self._sum(part, p, frequencies, seen)[0]
                     else:
-                        out[p, band] += self._through(self._screens, part, p, frequencies)
+                        out[p, band] += self._through(*self._sheets, part, p, frequencies)
                 report(number * n + rows.stop, len(bands) * n)
 
-    def _through(self, screens: Screens, part: FacetSet, p: int, frequencies: np.ndarray) -> np.ndarray:
+    def _through(
+        self, sheets: ThinSheets, seen: SeenThrough, part: FacetSet, p: int, frequencies: np.ndarray
+    ) -> np.ndarray:
         """As `_sum`, of facets that are seen past thin sheets, or through them: (n frequencies, n_polarizations)."""
         task, waves = self.task, 2 * np.pi * frequencies / SPEED_OF_LIGHT
         every, columns = np.arange(len(part)), [POLARIZATIONS.index(name) for name in task.polarizations]
         asked = replace(self, task=replace(task, polarizations=POLARIZATIONS))
         total = np.zeros((len(frequencies), 4), np.complex128)
-        for some, mean in screens.means(p, self._place(task.to_tx[p : p + 1]), waves):
+        for some, mean in seen.means(p, self._place(task.to_tx[p : p + 1]), waves):
             light = Light(every, np.ones((1, len(part))), mean)
             matrix = asked._sum(part, p, frequencies, light)[0].reshape(-1, 2, 2)
-            through = screens.transmission(some, task.to_tx[p], frequencies)
+            through = sheets.transmission(some, task.scene.center[None], -task.to_tx[p : p + 1], frequencies)[0]
             total += (np.swapaxes(through, 1, 2) @ matrix @ through).reshape(-1, 4)
         return total[:, columns]
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -141,14 +143,20 @@ def test_echoes_of_a_sheet_are_those_of_rcs():
 
 GLASS = sarcl.Material(6.0, thickness=0.005)
 TRACK = sarcl.Trajectory.line(start=(-1e3, -2, 800), velocity=(0, 10, 0), prf=10.0, n_pulses=4)
+ASIDE = sarcl.Trajectory.line(start=(-1e3, 90, 800), velocity=(0, 10, 0), prf=10.0, n_pulses=4)
 CHIRP = sarcl.Waveform.chirp(center=5e9, bandwidth=100e6, duration=1e-6)
 HOUSE = shapes.plate((1, 1), material=GLASS) + shapes.plate((1, 1), position=(0, 0, -1))
+BEHIND = shapes.plate((1, 1), material=GLASS) + shapes.plate((1, 1), position=(1.25, 0, -1))
+ROUGH = replace(BEHIND, roughness=np.array([0, 0, 0.01, 0.01]))
 BAD = {
     "negative": (lambda: sarcl.Material(3, thickness=-1), "thickness is -1 m; it cannot be negative"),
     "of a conductor": (lambda: sarcl.Material(thickness=0.01), "thickness is 0.01 m of a perfect conductor"),
     "rough": (lambda: sarcl.Material(3, height=1e-3, thickness=0.01), "or a rough surface"),
     "closed body": (lambda: shapes.box((1, 1, 1), material=GLASS), "facet 0 reflects from one side .*two_sided=True"),
-    "echo through it": (lambda: sarcl.echo(HOUSE, CHIRP, TRACK), "use rcs, which does"),
+    "echo elsewhere": (lambda: sarcl.echo(HOUSE, CHIRP, TRACK, receiver=ASIDE), "1 thin sheets; .*one antenna"),
+    "echo of edges": (lambda: sarcl.echo(HOUSE, CHIRP, TRACK, edges=True), "not computed with edges=True"),
+    "echo of bounces": (lambda: sarcl.echo(HOUSE, CHIRP, TRACK, bounces=2), "give bounces=1"),
+    "echo of rough facets": (lambda: sarcl.echo(ROUGH, CHIRP, TRACK), "facet 2 lies behind a thin sheet"),
     "spectral echo": (lambda: sarcl.spectral_echo(HOUSE, CHIRP, TRACK), "for which use echo or rcs"),
     "two antennas": (lambda: sarcl.rcs(HOUSE, 0, 1, 5e9, receiver=(0.1, 1)), "1 thin sheets; .*one antenna"),
     "checked": (lambda: sarcl.rcs(HOUSE, 0, 1, 5e9, check=True), "check=True has no second way"),
@@ -158,6 +166,7 @@ BAD = {
 }  # fmt: skip
 
 
+@pytest.mark.filterwarnings("ignore:too few facets for speckle")
 @pytest.mark.parametrize("name", BAD)
 def test_what_does_not_fit_is_named(name):
     call, message = BAD[name]
