@@ -184,7 +184,8 @@ def plan_scene(
         terms = len(antennas) * sum(band.n_samples for band in bands) or np.inf
         profiles = max((CUT_PROFILES * band.least_tolerance(min(PER_TILE), 0.0) for band in bands), default=0.0)
         center, bandwidth = seen.waveform.center, seen.waveform.bandwidth
-        view = FacetView(scene, antennas, center, bandwidth, request.polarizations, request.vertical)
+        shades = request.device if request.shadows else None
+        view = FacetView(scene, antennas, center, bandwidth, request.polarizations, request.vertical, shades)
         # lit parts are computed of pieces on the host; without bands nothing is added on a device
         on_device = bands and (not request.shadows or samples_shadows(request, seen))
         device = request.device if on_device else None
