@@ -192,6 +192,7 @@ def plan_scene(
         subdivision = plan_cut(
             share, view, weight_error, seen.waveform, max_edge, device, max_bytes=request.host, profiles=profiles,
             terms=terms, most=request.limits.facets, float64_terms=request.limits.float64_terms,
+            adds_others=request.bounces > 1,
         )  # fmt: skip
         room = share / subdivision.gain - subdivision.plan.predicted_error
         if not subdivision.plan.is_float64:  # pieces are not counted yet
