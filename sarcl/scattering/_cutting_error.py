@@ -12,7 +12,8 @@ docs/theory/facets.md derives it; tests/scattering/test_facet_errors.py measures
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from ..base.constants import SPEED_OF_LIGHT
 from ..base.rows import spread_over
 from ..base.vectors import unit
 from ..scene.triangles import areas, bisect, centroids, cut, edges
+from ..visibility.rays import SceneRays
 from . import facet_kinds
 from ._facet_norm import (
     FACETS,
@@ -60,6 +62,7 @@ class CuttingError:
             chosen[0] = np.argmax(length) if len(some) > FACETS else chosen[0]
             some = some[chosen]
         self._triangles, self._two_sided = scene.triangles[some], scene.two_sided[some]
+        self._view, self._numbers = view, some
         self._length = np.maximum.reduce(edges(self._triangles)) if len(some) else np.zeros(0)
         self._every = len(some) == int(mirror.sum()) and len(antennas.tx) <= FEW_PULSES
         if self._every and len(some):
@@ -78,6 +81,14 @@ class CuttingError:
         self._phase: float | None = None
         self._measured: dict[float, float | None] = {}
         self._errors: dict[float, float] = {}
+
+    @cached_property
+    def _rays(self) -> SceneRays | None:
+        """Rays by which facets shade one another, None where all of them are seen whole."""
+        view = self._view
+        if view.shades is None or view.antennas.forward or len(view.scene.triangles) < 2:
+            return None
+        return SceneRays(view.shades, view.scene.triangles)
 
     def gain(self, edge: float) -> float:
         """Norm of facets cut to `edge`, m (inf: not at all), over that of the facets as they are given, those of one
@@ -101,7 +112,8 @@ class CuttingError:
         """Error of all facets and pulses, relative to the facets as they are; None where that would take too long.
 
         Of few looks at a small body the errors of pieces are added up, each with its own phase: averages over pulses
-        and frequencies say nothing of one look, in which the errors of pieces may all be in phase.
+        and frequencies say nothing of one look, in which the errors of pieces may all be in phase. Only what the
+        antennas see past other facets counts: a bright facet in shadow would hide the errors of the others.
         """
         if not self._every:
             return None
@@ -153,7 +165,8 @@ class CuttingError:
 
         common = rest = power = 0.0
         for ends in self._error_ends:
-            echo, finer = self._seen(pieces, of, ends, 2).echoes(np.full(len(pieces), self._wavenumber))
+            seen = self._seen(pieces, of, ends, 2)
+            echo, finer = seen.echoes(np.full(len(pieces), self._wavenumber))
             error = 4 / 3 * (finer - echo)  # pieces of half the size have a quarter of it
             powers = summed(np.abs(echo) ** 2)
             shared = summed(error * echo.conj()) / np.where(powers > 0, powers, 1)
@@ -163,13 +176,15 @@ class CuttingError:
         return SAFETY * float(np.sqrt((common / gain**2 + rest) / power)) if power else float("inf")
 
     def _seen(self, pieces: np.ndarray, of: np.ndarray, ends: Ends, bisections: int) -> _Seen:
-        """What antennas at `ends` see of pieces (n, 3, 3), and of the 2^bisections parts of each; of  facets (n,)."""
+        """What antennas at `ends` see of pieces (n, 3, 3) past others of the scene, and of the 2^bisections parts of
+        each; of  facets (n,)."""
         places, finer = centroids(pieces), [pieces]
         for _ in range(bisections):
             finer = [half for one in finer for half in _halves(one)]
         parts = [(pieces, np.zeros(len(pieces)))]
         parts += [(one, path_beyond(ends, places, centroids(one) - places)) for one in finer]
-        return _Seen([(one, *self._scattering(one, of, ends), path) for one, path in parts])
+        seen = _Seen([(one, *self._scattering(one, of, ends), path) for one, path in parts])
+        return seen if self._rays is None else seen.shaded(self._rays, self._numbers[of], ends)
 
     def _scattering(self, triangles: np.ndarray, of: np.ndarray, ends: Ends) -> tuple[np.ndarray, np.ndarray]:
         """S times the reflectivity, complex128 (n, n polarisations), and u_t + u_r (n, 3)."""
@@ -190,18 +205,37 @@ class CuttingError:
 @dataclass(frozen=True, eq=False)
 class _Seen:
     """Pieces, then the parts of each: triangles (n, 3, 3), S (n, n polarisations), u_t + u_r (n, 3), and the two-way
-    path beyond that of the piece's centroid, m (n,)."""
+    path beyond that of the piece's centroid, m (n,).
+
+    lit  whether antennas see the middle of each part (n,); None: all of them
+    """
 
     parts: list[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]
+    lit: list[np.ndarray] | None = None
+
+    def shaded(self, rays: SceneRays, facet: np.ndarray, ends: Ends) -> _Seen:
+        """The same with what antennas at `ends` see past others of the scene's facets; facet  of each piece (n,)."""
+        places = [centroids(triangles) for triangles, *_ in self.parts[1:]]
+        ways = ends[:1] if np.array_equal(*ends) else ends
+        hidden = [[rays.any_hit(p, np.tile(end, (len(p), 1)), leaving=facet) for end in ways] for p in places]
+        return replace(self, lit=[~np.any(one, axis=0) for one in hidden])
 
     def echoes(self, k: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """S I of the pieces with linear phase, about their centroids, complex128 (n, n polarisations), and the same as
         sums over their parts; k  rad/m (n,)."""
-        echoes_of_parts = [
-            matrix * (triangle_integral(triangles, k[:, None] * q) * np.exp(-1j * k * path))[:, None]
-            for triangles, matrix, q, path in self.parts
-        ]
-        return echoes_of_parts[0], np.asarray(sum(echoes_of_parts[1:]))
+
+        def integrals(triangles: np.ndarray, q: np.ndarray, path: np.ndarray) -> np.ndarray:
+            return np.asarray((triangle_integral(triangles, k[:, None] * q) * np.exp(-1j * k * path))[:, None])
+
+        (pieces, matrix, q, path), *parts = self.parts
+        lit = [np.ones(len(k), bool)] * len(parts) if self.lit is None else self.lit
+        echo = integrals(pieces, q, path)
+        partly, linear, finer = ~np.all(lit, axis=0), np.zeros_like(echo), np.zeros_like(matrix)
+        for (part, exact, *way), is_lit in zip(parts, lit, strict=True):
+            finer += is_lit[:, None] * exact * integrals(part, *way)
+            if partly.any():  # the linear phase of the piece, over its parts that are lit
+                linear += is_lit[:, None] * integrals(part, q, -(q * (centroids(part) - centroids(pieces))).sum(axis=1))
+        return matrix * np.where(partly[:, None], linear, echo), finer
 
 
 def _halves(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

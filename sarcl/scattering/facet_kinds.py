@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from ..numerics.pulse_geometry import PulseGeometry
+from ..opencl.device import Device
 from ..scene.material import COHERENT
 from ..scene.scene import Scene
 
@@ -18,6 +19,7 @@ class FacetView:
     """Facets of a scene as antennas see them over a band, center and bandwidth in Hz, in some polarisations.
 
     vertical  unit vector (3,): V lies in the plane of it and the line of sight
+    shades    device by which shadows of facets on one another are found; None: all are seen whole
     """
 
     scene: Scene
@@ -26,6 +28,7 @@ class FacetView:
     bandwidth: float
     polarizations: Sequence[str]
     vertical: np.ndarray
+    shades: Device | None = None
 
     @cached_property
     def mirror(self) -> np.ndarray:

@@ -5,7 +5,7 @@ docs/theory/facets.md derives each term; tests/scattering/test_facet_engine.py m
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -24,6 +24,7 @@ from ._direction_error import DirectionError
 from ._frequency_nodes import OverBand, cross_polarization_ratio
 from .antenna_weights import MOST_NODES, WeightError
 from .facet_kinds import FacetView
+from .facets import POLARIZATIONS
 
 GIGAHERTZ = 1e9  # amplitudes are divided by f in GHz, to stay clear of the smallest float32 numbers
 LADDER = 2.0 ** (1 / 2)  # ratio of the edge lengths that are tried
@@ -34,6 +35,7 @@ WORTH_FLOAT32 = 64  # ratio of facets: float32 is not tried with more of them, w
 # bytes per cut facet of an echo: corners, normals, materials and illumination on the host, measured with 1e6 facets
 FACET_BYTES = 512
 DARK = 30.0  # amplitude ratio of all polarisations to the cross-polarised ones asked for, above which errors name it
+ROUNDED = 1e10  # the same ratio, above which the cross-polarised amplitudes are rounding of float64 alone
 # rms error of amplitudes in float32, relative to their rms; 1.5e-7 measured by tests/scattering/test_facet_kernel.py
 KERNEL = 5e-7
 TO_CORNER = 2 / 3  # largest distance of a corner from the centroid, relative to the longest edge
@@ -47,6 +49,7 @@ class FacetPlan:
     predicted_error  relative to the facets as they are cut, at random phases; times `gain`, relative to the facets as
                      they were given;  n_facets  number of facets after cutting, about
     is_float64       amplitudes are computed and added up in float64, frequency by frequency, without nodes
+    is_dark          rounding alone in the polarisations that are asked for, beside which other echoes are added
     """
 
     max_edge: float
@@ -56,6 +59,7 @@ class FacetPlan:
     power: int = 1
     gain: float = 1.0
     is_float64: bool = False
+    is_dark: bool = False
 
     def basis(self, frequencies: np.ndarray) -> np.ndarray:
         """Lagrange's polynomials of the nodes at frequencies f, Hz (m,), times (f/1 GHz)^power: (n, m).
@@ -87,6 +91,8 @@ class CutLimits:
     terms      pulses times samples: with few of them and few facets, sums may be in float64; inf: never
     most       facets in all
     float64_terms  facets times pulses times samples that may be added up in float64, in about a second
+    adds_others    other echoes are added, such as several reflections, beside which facets dark in the polarisations
+                   that are asked for may be added up in float64
     """
 
     finest: float
@@ -98,6 +104,7 @@ class CutLimits:
     terms: float
     most: float = MOST_FACETS
     float64_terms: float = 4e6
+    adds_others: bool = False
 
 
 def plan_facets(tolerance: float, view: FacetView, weights: WeightError, limits: CutLimits) -> FacetPlan:
@@ -135,6 +142,9 @@ class _PlanSearch:
         self.top = float(self.longest[mirror].max(initial=0.0)) or float(self.longest.max())
         self.distance = nearest(scene, view.antennas, box(scene.triangles.reshape(-1, 3)))
         self.cross_ratio = cross_polarization_ratio(view, self.top, limits.cell)
+        self.is_dark = limits.adds_others and self.cross_ratio > ROUNDED
+        if self.is_dark:  # what rounding makes has no error of its own
+            view = replace(view, polarizations=POLARIZATIONS)
         # where both kinds are there, facets that a device cuts have a plan of their own
         apart = limits.on_device & mirror.any()
         self.over_band = OverBand(view, limits.cell, apart)
@@ -162,12 +172,14 @@ class _PlanSearch:
             return False
         # the kernels know neither forward scatter nor thin sheets
         on_host = self.view.antennas.forward or bool(self.view.scene.sheets.any())
-        is_small = on_host or (count * limits.terms <= limits.float64_terms and self.cross_ratio <= DARK)
+        is_small = on_host or (
+            count * limits.terms <= limits.float64_terms and (self.cross_ratio <= DARK or limits.adds_others)
+        )
         rounding = self._rounding(edge) + self.weights.rounding
         gain, shape = self._shape(edge, 0.0 if is_small else rounding) if mirror.any() else (1.0, 0.0)
         if is_small and self.exact is None and gain * shape <= SHARE * self.tolerance:
             nodes = np.array([self.view.center])
-            self.exact = FacetPlan(edge, nodes, shape, count, power=1, gain=gain, is_float64=True)
+            self.exact = FacetPlan(edge, nodes, shape, count, 1, gain, is_float64=True, is_dark=self.is_dark)
         self.least_rounding = min(self.least_rounding, self._required(gain, rounding))
         error = rounding + shape
         if on_host:
@@ -218,7 +230,8 @@ class _PlanSearch:
         if self._rounding(0.0) >= SHARE * tolerance and self.cross_ratio > DARK:
             names, ratio_db = ", ".join(self.view.polarizations), 20 * np.log10(self.cross_ratio)
             how = f"in {names}, in which these facets send back {ratio_db:.0f} dB less than in HH and VV"
-            return ToleranceUnreachable(tolerance, None, float32, "ask for HH or VV", how=how)
+            remedy = f"ask for {('HH', *self.view.polarizations)}" if self.limits.adds_others else "ask for HH or VV"
+            return ToleranceUnreachable(tolerance, None, float32, remedy, how=how)
         reach = self.least * (1 + 1e-9) if np.isfinite(self.least) else None
         if not self.limits.cuts:
             how = f"with facets of up to {self.top:.3g} m uncut"

@@ -222,6 +222,12 @@ class SceneEchoes:
             raise NothingSeen(
                 "every facet in the range window faces away from an antenna; move the track or turn the scene"
             )
+        if self.subdivision is not None and self.subdivision.plan.is_dark and not any(counts.orders[1:]):
+            names = self.request.polarizations
+            raise NothingSeen(
+                f"polarization is {', '.join(names)}, in which single reflections of these facets are rounding alone, "
+                f"and no wave of several arrives: ask for {('HH', *names)}"
+            )
 
     def counted(self, counts: Counts, channels: int = 1) -> dict[str, Any]:
         """Contributions done and skipped, as a report has them."""

@@ -184,13 +184,15 @@ def plan_scene(
         terms = len(antennas) * sum(band.n_samples for band in bands) or np.inf
         profiles = max((CUT_PROFILES * band.least_tolerance(min(PER_TILE), 0.0) for band in bands), default=0.0)
         center, bandwidth = seen.waveform.center, seen.waveform.bandwidth
-        view = FacetView(scene, antennas, center, bandwidth, request.polarizations, request.vertical)
+        shades = request.device if request.shadows else None
+        view = FacetView(scene, antennas, center, bandwidth, request.polarizations, request.vertical, shades)
         # lit parts are computed of pieces on the host; without bands nothing is added on a device
         on_device = bands and (not request.shadows or samples_shadows(request, seen))
         device = request.device if on_device else None
         subdivision = plan_cut(
             share, view, weight_error, seen.waveform, max_edge, device, max_bytes=request.host, profiles=profiles,
             terms=terms, most=request.limits.facets, float64_terms=request.limits.float64_terms,
+            adds_others=request.bounces > 1,
         )  # fmt: skip
         room = share / subdivision.gain - subdivision.plan.predicted_error
         if not subdivision.plan.is_float64:  # pieces are not counted yet

@@ -188,6 +188,25 @@ def test_the_error_between_frequencies_is_no_more_than_samples_say(material, edg
             assert found <= errors[power][n] + 1e-14, (power, n)
 
 
+@pytest.mark.parametrize("angle", [20, 30])
+def test_a_bright_facet_in_shadow_hides_no_errors(angle):
+    """A tilted triangle from 30 m, and behind it one along the wavefronts, whose echo would be 10 to 20 times as
+    strong."""
+    c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+    screen = np.array([[-1.5 * c, -1.2, 1.5 * s], [1.5 * c, -1.2, -1.5 * s], [0, 1.8, 0.1]])
+    hidden = np.array([[-0.4, -0.6, -3], [0.4, -0.6, -3], [0, 0.2, -3]])
+    scene, low = sarcl.Scene.facets([screen, hidden]), sarcl.Waveform.chirp(center=1e9, bandwidth=2e7, duration=1e-6)
+    raw = sarcl.echo(
+        scene, low, still([0, 0, 30.0]), tolerance=1e-1, range_window=(-20, 20), vertical=VERTICAL, check=False
+    )
+    f, up = raw.frequency[0] + raw.frequency_step[0] * np.arange(0, raw.n_samples, 7), tuple(VERTICAL.tolist())
+    place = raw.tx[0], raw.tx[0], raw.reference_range[0]
+    wanted = facet.facet_echo(screen[None], np.inf, f, *place, up=up)[:, 0, 0]
+    wanted *= np.abs(low.pulse_spectrum(f)) ** 2
+    achieved = np.linalg.norm(raw.samples[0, ::7] - wanted) / np.linalg.norm(wanted)
+    assert 1e-3 < achieved <= raw.report.predicted_error <= 1e-1
+
+
 # Directions -------------------------------------------------------------------------------------------------
 
 UP = np.array([0.0, 0.0, 1.0])

@@ -183,3 +183,38 @@ def test_a_dihedral_appears_on_its_fold_and_a_trihedral_at_its_vertex():
 def test_cross_polarisation_is_reciprocal_where_the_beam_is_strong():
     amplitude = seen(triangular_trihedral(0.5), toward(25, 35))
     assert abs(amplitude[1] - amplitude[2]) < 0.01 * abs(amplitude[0])
+
+
+def rolled_dihedral(degrees: float) -> tuple[sarcl.Scene, sarcl.Trajectory]:
+    """A dihedral rolled about the line of sight along which it looks, at 10 km, and a track of one pulse."""
+    look = np.array([1.0, 0, 1]) / np.sqrt(2)
+    k, angle = np.cross(np.eye(3), look), np.radians(degrees)
+    roll = np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * k @ k
+    return sarcl.shapes.dihedral((1, 1), rotation=roll), sarcl.Trajectory(None, 1e4 * look[None])
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-3])
+def test_a_polarisation_that_is_dark_after_one_reflection_and_bright_after_two(tolerance):
+    scene, track = rolled_dihedral(45)
+    both = sarcl.echo(scene, CHIRP, track, bounces=2, polarization=("HH", "HV"), tolerance=tolerance / 10)
+    raw = sarcl.echo(scene, CHIRP, track, bounces=2, polarization="HV", tolerance=tolerance)
+    wanted = both.select(polarization="HV").samples
+    assert np.linalg.norm(wanted) > 10 * np.linalg.norm(both.select(polarization="HH").samples)
+    assert np.linalg.norm(raw.samples - wanted) <= (raw.report.predicted_error + tolerance / 10) * np.linalg.norm(
+        wanted
+    )
+    assert raw.report.predicted_error <= tolerance
+
+
+def test_a_dark_polarisation_without_a_second_reflection_is_refused():
+    _, track = rolled_dihedral(0)
+    plate = sarcl.shapes.plate((0.2, 0.3), rotation=(0.3, -0.7, 0.1))
+    with pytest.raises(ValueError, match=r"in which single reflections .* rounding alone.*\('HH', 'HV'\)"):
+        sarcl.echo(plate, CHIRP, track, bounces=2, polarization="HV", tolerance=1e-2)
+
+
+def test_many_pulses_in_a_dark_polarisation_are_refused_with_the_remedy():
+    scene, track = rolled_dihedral(45)
+    many = sarcl.Trajectory(None, np.repeat(track.positions, 20_000, axis=0))
+    with pytest.raises(sarcl.ToleranceUnreachable, match=r"dB less than in HH and VV; ask for \('HH', 'HV'\)"):
+        sarcl.echo(scene, CHIRP, many, bounces=2, polarization="HV", tolerance=1e-2)
