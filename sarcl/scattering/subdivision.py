@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -91,7 +92,7 @@ def plan_cut(
     waveform: Waveform,
     max_edge: float | str | None,
     device: Device | None,
-    **limits: float,
+    **limits: Any,
 ) -> Subdivision:
     """How to cut a scene's facets within `share` of a tolerance.
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...base.constants import EDGE_ON
 from ...base.vectors import dot, unit
-from ._facet_tree import Cones, FacetTree
+from ._facet_tree import MOST_PAIRS, Cones, FacetTree
 from ._polygons import Polygons, apart, folded, joined
 
 ON_PLANE = 1e-6  # of the scene's diagonal: corners nearer to a plane lie in it, as for shadows (visibility/lit_parts)
@@ -33,13 +33,14 @@ class Surfaces:
     """Facets that reflect, convex and about the scene's centre; those not in `mirrors` only cast shadows.
 
     two_sided, mirrors  (k,) bool;  closed  (k,) bool: those of closed bodies, whose shadows are those of the facets
-    that face the light
+    that face the light;  most_pairs  of a beam and a facet that are looked at together
     """
 
     polygons: Polygons
     two_sided: np.ndarray
     mirrors: np.ndarray
     closed: np.ndarray
+    most_pairs: int = MOST_PAIRS
 
     @property
     def corners(self) -> np.ndarray:
@@ -70,7 +71,7 @@ class Surfaces:
     @cached_property
     def tree(self) -> FacetTree:
         """All facets by place."""
-        return FacetTree(self.corners)
+        return FacetTree(self.corners, self.most_pairs)
 
     @property
     def on_plane(self) -> float:

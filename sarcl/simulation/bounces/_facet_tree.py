@@ -12,10 +12,8 @@ from ._polygons import folded
 
 BRANCHES = 8  # spheres that the sphere above them holds
 AT_ONCE = 20_000  # cones that are looked at together
-MOST_PAIRS, PAIR_BYTES = (
-    20_000_000,
-    400.0,
-)  # pairs of a beam and a facet, and bytes that each takes while it is looked at
+MOST_PAIRS = 20_000_000  # pairs of a beam and a facet that are looked at together
+PAIR_BYTES = 400.0  # that each of them takes meanwhile
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,14 +36,15 @@ class Cones:
         along = np.einsum("ij,ij->i", step, self.axis[which])
         across = np.einsum("ij,ij->i", step, step) - along**2
         radius = self.radius[which]
-        width = radius + size + self.widening[which] * np.maximum(along + size, 0)
+        width = radius + size + self.widening[which] * np.maximum(along + size + radius, 0)
         return np.asarray((across <= width**2) & (along > -size - radius) & (along < size + self.reach[which]))
 
 
 class FacetTree:
     """Triangles, m (k, 3, 3), that are looked up by cones."""
 
-    def __init__(self, triangles: np.ndarray) -> None:
+    def __init__(self, triangles: np.ndarray, most_pairs: int = MOST_PAIRS) -> None:
+        self._most_pairs = most_pairs
         self._order = morton_order(triangles.mean(axis=1)) if len(triangles) else np.zeros(0, np.int64)
         self._triangles = triangles[self._order]
 
@@ -72,7 +71,7 @@ class FacetTree:
         for first in range(0, len(cones.radius), AT_ONCE):
             pairs.append(self._pairs_within(cones, first))
             number += len(pairs[-1][0])
-            if number > MOST_PAIRS:
+            if number > self._most_pairs:
                 total = number / (first + AT_ONCE) * len(cones.radius)
                 raise MemoryError(
                     f"facets of this scene may reflect to one another in about {total:.0e} ways, which need "

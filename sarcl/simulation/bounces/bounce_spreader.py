@@ -20,6 +20,7 @@ from ..spreading import ChannelView, Counts
 from . import _beams, _occlusion, _sums
 from ._amplitudes import Coatings, Facets
 from ._beams import Beams, Surfaces
+from ._facet_tree import MOST_PAIRS
 from ._flat_facets import closed, joined_facets, tiles
 from ._polygons import Polygons, joined
 from ._weak_beams import bounds, strong
@@ -30,10 +31,21 @@ WEAK = 0.1  # of the tolerance: sum of the bounds of beams that are left out
 CURVATURE = 0.9  # rad over the tolerance: phase of the wave's curvature over a triangle; the rest is for weak beams
 DIRECTION = 0.5  # rad over the root of the tolerance: by which directions change over a triangle
 PROFILES = 1 / 300  # of the tolerance: error of sums over frequencies
-MANY = 30  # facets that a beam may reach, on average, from which on shadows on single facets are looked at first
 MOST_SHADING = 20_000  # facets that only cast shadows, from which on joining them would take longer than it saves
 NARROW = 0.5  # share of the area in facets narrower than a wavelength from which on there is a warning
 NODES = 6  # frequencies at which matrices of dispersive materials are computed
+
+
+@dataclass(frozen=True)
+class BeamLimits:
+    """How beams are looked for.
+
+    many        facets that a beam may reach, on average, from which on shadows on single facets are looked at first
+    most_pairs  of a beam and a facet that are looked at together
+    """
+
+    many: float = 30.0
+    most_pairs: int = MOST_PAIRS
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +60,7 @@ class BounceScene:
     origin: np.ndarray
     bounces: int
     tolerance: float
+    limits: BeamLimits = BeamLimits()
 
     @classmethod
     def of(cls, scene: Scene, bounces: int, tolerance: float) -> BounceScene | None:
@@ -80,7 +93,7 @@ class BounceScene:
             coatings.material[some], coatings.materials, coatings.reflectivity[some], coatings.height[some]
         )
         flags = surfaces.two_sided[some], surfaces.mirrors[some], surfaces.closed[some]
-        return Surfaces(polygons, *flags), coatings
+        return Surfaces(polygons, *flags, self.limits.most_pairs), coatings
 
     def narrow_share(self, wavelength: float) -> float:
         """Share of the area that reflects to others in facets narrower than a wavelength, m, once flat parts are
@@ -207,7 +220,7 @@ class BounceSpreader:
                 return
             pairs, sides = _beams.reached(surfaces, beams, turn), None
             is_last = number == self.scene.bounces
-            if len(pairs[0]) > MANY * len(beams.chains):  # what is in shadow is worth knowing before
+            if len(pairs[0]) > self.scene.limits.many * len(beams.chains):  # what is in shadow is worth knowing before
                 if number == 2:
                     lit = _occlusion.sides_seen(surfaces, tx, turn)
                     facet, normal = beams.chains[:, 0], beams.normals[:, 0]

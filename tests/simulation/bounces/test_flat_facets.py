@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import sarcl
 from sarcl.base.errors import NothingSeen
+from sarcl.simulation.bounces.bounce_spreader import BeamLimits, BounceScene
 
 CHIRP = sarcl.Waveform.chirp(center=9.6e9, bandwidth=50e6, duration=1e-6)
 PLATES = np.array(
@@ -156,6 +159,12 @@ def test_what_is_at_the_edge_of_a_beam_shades_it_at_all_pulses_of_a_block():
     assert np.linalg.norm(together - np.concatenate(apart)) <= 1e-6 * np.linalg.norm(together)
 
 
+def limit(monkeypatch, **limits):
+    """Let beams be looked for within other limits."""
+    prepare = BounceScene.of
+    monkeypatch.setattr(BounceScene, "of", lambda *given: replace(prepare(*given), limits=BeamLimits(**limits)))
+
+
 @pytest.mark.parametrize("bounces", [2, 3])
 def test_shadows_on_single_facets_looked_at_first_change_nothing(bounces, monkeypatch):
     rng = np.random.default_rng(7)
@@ -165,7 +174,7 @@ def test_shadows_on_single_facets_looked_at_first_change_nothing(bounces, monkey
     scene = sarcl.Scene.facets(triangles, two_sided=rng.random(len(triangles)) < 0.7)
     samples, receiver = [], sarcl.Trajectory(None, np.array([[900, 300, 1.1e3]]))
     for many in (0, 1000):
-        monkeypatch.setattr("sarcl.simulation.bounces.bounce_spreader.MANY", many)
+        limit(monkeypatch, many=many)
         samples += [
             sarcl.echo(
                 scene, CHIRP, LOOK, receiver=other, bounces=bounces, reference=(0.5, 0.5, 0.5), range_window=(-9, 9),
@@ -178,7 +187,7 @@ def test_shadows_on_single_facets_looked_at_first_change_nothing(bounces, monkey
 
 
 def test_too_many_pairs_of_facets_are_refused_with_a_remedy(monkeypatch):
-    monkeypatch.setattr("sarcl.simulation.bounces._facet_tree.MOST_PAIRS", 2)
+    limit(monkeypatch, most_pairs=2)
     with pytest.raises(
         MemoryError, match=r"may reflect to one another in about .* ways.*fewer bounces, a coarser mesh"
     ):
