@@ -155,6 +155,7 @@ def test_rounding_does_not_decide_which_pieces_are_cut():
         assert len(counts) == 1
 
 
+@pytest.mark.filterwarnings("ignore:the permittivity of wet soil is known")
 @pytest.mark.parametrize("material", ["metal", "wet soil", ROUGH])
 @pytest.mark.parametrize("edge", [0.03, 0.2, 0.6])
 @pytest.mark.parametrize("bandwidth", [0.06, 0.4])

@@ -49,7 +49,8 @@ class PostSpacing:
 def judge(scene: Scene, antennas: PulseGeometry, waveform: Waveform) -> PostSpacing:
     """Spacing of the posts of a scene that is not yet realized; none to warn of without point_roughness.
 
-    With an antenna at the scene's centre, or forward scattering, there is no resolution cell and no verdict.
+    With an antenna at the scene's centre, forward scattering, or a single direction there is no resolution cell and no
+    verdict.
     """
     if not scene.has_random_points:
         return PostSpacing()
@@ -63,10 +64,11 @@ def judge(scene: Scene, antennas: PulseGeometry, waveform: Waveform) -> PostSpac
     turn = look - look[0]
     turn = turn[np.linalg.norm(turn, axis=1).argmax()]
     turn = turn - middle * (turn @ middle) / along**2
+    if not turn.any():
+        return PostSpacing()
     axes = 2 / constants.SPEED_OF_LIGHT * np.stack([waveform.bandwidth * middle, waveform.center * turn])  # cells/m
     moved = scene.triangles[scene.point_roughness.any(axis=(1, 2))]
     resolved = float(np.median(np.ptp(moved @ axes.T, axis=1), axis=0).max())
     spacing = float(np.median(edges(moved).min(axis=0)))
-    with np.errstate(divide="ignore"):
-        range_cell, cross_cell = (float(width) for width in 1 / np.linalg.norm(axes, axis=1))
+    range_cell, cross_cell = (float(width) for width in 1 / np.linalg.norm(axes, axis=1))
     return PostSpacing(spacing, (range_cell, cross_cell), spacing / max(resolved, 1e-300))

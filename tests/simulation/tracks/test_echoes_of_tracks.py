@@ -79,6 +79,7 @@ def assert_equal(ones, others):
         assert dict(one.report.plan) == dict(other.report.plan)
 
 
+@pytest.mark.filterwarnings("ignore:point_roughness moves posts")
 @pytest.mark.filterwarnings("ignore:bistatic angles reach")
 @pytest.mark.parametrize("task", TASKS)
 def test_a_list_has_the_bits_of_single_calls(task):
@@ -99,6 +100,7 @@ def test_tracks_of_an_orbit():
     assert_equal(sarcl.echo(scene, CHIRP, tracks, **options), of_single_calls(scene, tracks, options))
 
 
+@pytest.mark.filterwarnings("ignore:point_roughness moves posts")
 def test_two_threads_and_two_radars_on_one_scene():
     scene = rough() + BOX
     waves = CHIRP, sarcl.Waveform.chirp(center=1.3e9, bandwidth=60e6, duration=1e-6)
