@@ -158,7 +158,7 @@ def cross_section(name: str, n: int) -> VerbCase:
             parts = parts * np.exp(2j * k * facets.mean(axis=1) @ look)
             far, f = 1e7 * look, np.array([CENTER])
             for ends, *frame in zip(edges.ends, edges.inward, edges.normal, edges.number, strict=True):
-                parts = np.append(parts, edge_echo(ends, tuple(frame), f, far, far, 1e7)[0, 0, 0])
+                parts = np.append(parts, edge_echo(ends, tuple(frame), f, (far, far), 1e7)[0, 0, 0])
             wanted[i] = parts.sum()
         return relative(s[some], wanted, 0.0)
 

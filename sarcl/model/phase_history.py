@@ -150,6 +150,10 @@ class PhaseHistory(NotebookTable):
             bad = int(np.argmin(self.weight))
             raise ValueError(f"weight[{bad}] is {self.weight[bad]:g}; it cannot be negative")
         self._set("compressed", validation.flag("compressed", self.compressed))
+        self._check_origin()
+
+    def _check_origin(self) -> None:
+        """Checks of what the echoes come from: fields that are not of rows."""
         if self.report is not None:
             validation.instance("report", self.report, Report)
         if self.image_area is not None:

@@ -17,8 +17,7 @@ def edge_echo(
     ends: np.ndarray,
     frame: tuple[np.ndarray, np.ndarray, float],
     frequencies: np.ndarray,
-    tx: np.ndarray,
-    rx: np.ndarray,
+    antennas: tuple[np.ndarray, np.ndarray],
     reference_range: float,
     *,
     up: tuple[float, float, float] = UP,
@@ -28,10 +27,11 @@ def edge_echo(
     """Echo of one edge of a conductor, complex128 (n_f, 2, 2) [r, t], m: 0 is H and 1 is V.
 
     ends  m (2, 3);  frame  of its wedge: inward, normal, number, as sarcl.scene.wedges has them
-    tx, rx  m (3,);  reference_range  m;  seen  (places, antenna) -> whether it sees them (n,); None: it does
+    antennas  places of transmitter and receiver, m (3,) each;  reference_range  m
+    seen  (places, antenna) -> whether it sees them (n,); None: it does
     per_wavelength  elements, each a plane wave with the directions and the path of its own middle
     """
-    way = ends[1] - ends[0]
+    (tx, rx), way = antennas, ends[1] - ends[0]
     n = int(np.linalg.norm(way) * per_wavelength * frequencies.max() / SPEED_OF_LIGHT) + 1
     places = ends[0] + (np.arange(n) + 0.5)[:, None] / n * way
     looks = [unit(end - places) for end in (tx, rx)]

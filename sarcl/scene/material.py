@@ -72,14 +72,9 @@ class Material:
             else:
                 value = default[name] if value is None else _number(name, value, name in ("conductivity", "height"))
             object.__setattr__(self, name, value)
-        exponents = validation.pair("exponents", self.exponents)
-        object.__setattr__(
-            self,
-            "exponents",
-            (_number("exponents[0]", exponents[0], False), _number("exponents[1]", exponents[1], False)),
-        )
+        object.__setattr__(self, "exponents", _two("exponents", self.exponents))
         if self.band is not None:
-            low, high = (_number("band", value, False) for value in validation.pair("band", self.band))
+            low, high = _two("band", self.band)
             if not 0 < low < high:
                 raise ValueError(f"band is {low:g} to {high:g} Hz; give the lower frequency first, both greater than 0")
             object.__setattr__(self, "band", (low, high))
@@ -202,6 +197,12 @@ def _number(name: str, value: object, inf: bool) -> float:
     if inf and isinstance(value, (float, np.floating)) and value == np.inf:
         return np.inf
     return validation.number(name, value)
+
+
+def _two(name: str, values: object) -> tuple[float, float]:
+    """Two finite numbers; an error names the argument."""
+    first, second = validation.pair(name, values)
+    return _number(f"{name}[0]", first, False), _number(f"{name}[1]", second, False)
 
 
 def _lossy(value: complex) -> complex:

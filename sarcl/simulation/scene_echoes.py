@@ -165,21 +165,9 @@ class SceneEchoes:
             leveled = plan.factorized_spreader(request.device, self.points, view, nodes, request.same, request.budget)
             spreaders += [] if leveled is None else [leveled]
             parts.append((ErrorTerm("points", plan.predicted_error + error, SMALLER_TOLERANCE), plan.describe()))
-        hidden, seen_through = 0.0, dict[str, Any]()
-        if self.behind_sheets is not None:
-            behind = SheetEchoes(self.behind_sheets, view, first)
-            spreaders.append(behind)
-            hidden, seen_through = self.behind_sheets.error, behind.describe()
-            if not self.facets:
-                parts.append((ErrorTerm("facets", hidden, SMALLER_TOLERANCE), seen_through | self.mesh_warnings))
-        if self.subdivision is not None and self.subdivision.plan.is_float64:
-            for facets in self.facets:
-                exact = ExactFacets(facets.within(first, stop, self.n_pulses), self.subdivision.plan, view)
-                words = exact.describe() | self.mesh_warnings | self.shadow_words | seen_through
-                # each relative to the norm of the facets that it adds: not more of all of them
-                error = max(self.subdivision.plan.gain * exact.predicted_error, hidden)
-                parts.append((ErrorTerm("facets", error, SMALLER_TOLERANCE), words))
-                spreaders.append(exact)
+        on_host, of_host = self._facets_on_host(view, first)
+        spreaders += on_host
+        parts += of_host
         spread = []
         for tiled in self.tiled_facets:
             gain, facets = tiled.facet_plan.gain, tiled.facets.within(first, stop, self.n_pulses)
@@ -210,6 +198,28 @@ class SceneEchoes:
             words |= edges.describe()
             error_terms = *error_terms, ErrorTerm("edges", self.edges.error, SMALLER_TOLERANCE)
         return ChannelEchoes(self, points, tuple(spreaders), error_terms, words)
+
+    def _facets_on_host(
+        self, view: ChannelView, first: int
+    ) -> tuple[list[Spreader], list[tuple[ErrorTerm, dict[str, Any]]]]:
+        """Facets that are added in float64, those seen through thin sheets first; their error terms and words."""
+        spreaders, parts, hidden, seen_through = list[Spreader](), [], 0.0, dict[str, Any]()
+        if self.behind_sheets is not None:
+            behind = SheetEchoes(self.behind_sheets, view, first)
+            spreaders.append(behind)
+            hidden, seen_through = self.behind_sheets.error, behind.describe()
+            if not self.facets:
+                parts.append((ErrorTerm("facets", hidden, SMALLER_TOLERANCE), seen_through | self.mesh_warnings))
+        if self.subdivision is not None and self.subdivision.plan.is_float64:
+            for facets in self.facets:
+                some = facets.within(first, first + len(view.antennas), self.n_pulses)
+                exact = ExactFacets(some, self.subdivision.plan, view)
+                words = exact.describe() | self.mesh_warnings | self.shadow_words | seen_through
+                # each relative to the norm of the facets that it adds: not more of all of them
+                error = max(self.subdivision.plan.gain * exact.predicted_error, hidden)
+                parts.append((ErrorTerm("facets", error, SMALLER_TOLERANCE), words))
+                spreaders.append(exact)
+        return spreaders, parts
 
     def check_seen(self, counts: Counts, near: float, far: float) -> None:
         """NothingSeen where nothing at all was added within the range window from near to far, m."""

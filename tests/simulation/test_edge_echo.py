@@ -42,7 +42,7 @@ def summed(scene, raw, track, receiver=None, seen=None, per_wave=20):
         reference = (np.linalg.norm(to) + np.linalg.norm(back)) / 2
         for ends, *frame in zip(edges.ends, edges.inward, edges.normal, edges.number, strict=True):
             options = {"seen": seen, "per_wavelength": per_wave}
-            one = edge_echo(ends, tuple(frame), frequencies, to, back, reference, **options)
+            one = edge_echo(ends, tuple(frame), frequencies, (to, back), reference, **options)
             one = one.transpose(1, 2, 0)[[0, 0, 1], [0, 1, 1]]
             out[p], power = out[p] + one, power + (np.abs(one) ** 2).sum()
     return out, np.sqrt(power)

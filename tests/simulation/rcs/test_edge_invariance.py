@@ -60,7 +60,7 @@ def test_a_half_hidden_edge_is_the_edge_cut_at_the_end_of_its_shadow():
             share = min((-shift - low) / max(high - low, 1e-9), 1.0)
             start, stop = ends[np.argsort(ends[:, 0], kind="stable")]
             seen = np.array([start, start + share * (stop - start)])
-            one = edge_echo(seen, tuple(frame), np.array([F]), 1e8 * look, 1e8 * look, 1e8, per_wavelength=200)[0]
+            one = edge_echo(seen, tuple(frame), np.array([F]), (1e8 * look, 1e8 * look), 1e8, per_wavelength=200)[0]
             wanted += one[[0, 1], [0, 1]]
     assert difference(wanted, both - alone) < 2e-3  # the end of the shadow is found to 1/4096 of a piece
 
