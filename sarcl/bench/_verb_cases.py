@@ -140,7 +140,7 @@ def cross_section(name: str, n: int) -> VerbCase:
     """A box of facets with legs of 1/n m, with its edges, from 360 directions; against sums over all in float64."""
     box = shapes.box((1.0, 0.7, 0.5), rotation=(0.2, 0.1, 0.4)).split(1 / n)
     azimuth, elevation, k = np.radians(np.arange(360.0)), 0.5, 2 * np.pi * CENTER / SPEED_OF_LIGHT
-    some = np.random.default_rng(0).integers(0, 360, CHECKED)
+    checked = np.random.default_rng(0).integers(0, 360, CHECKED)
 
     def call(*, check: bool, **options: Any) -> np.ndarray:
         return verbs.rcs(box, azimuth, elevation, CENTER, edges=True, **options)
@@ -150,7 +150,7 @@ def cross_section(name: str, n: int) -> VerbCase:
 
         wanted = np.zeros(CHECKED, complex)
         edges = wedges(box.triangles, box.two_sided, 0.35)
-        for i, a in enumerate(azimuth[some]):
+        for i, a in enumerate(azimuth[checked]):
             look = np.array([np.cos(elevation) * np.cos(a), np.cos(elevation) * np.sin(a), np.sin(elevation)])
             facets = box.triangles[normals(box.triangles) @ look > 0]
             cosine = normals(facets) @ look
@@ -160,7 +160,7 @@ def cross_section(name: str, n: int) -> VerbCase:
             for ends, *frame in zip(edges.ends, edges.inward, edges.normal, edges.number, strict=True):
                 parts = np.append(parts, edge_echo(ends, tuple(frame), f, (far, far), 1e7)[0, 0, 0])
             wanted[i] = parts.sum()
-        return relative(s[some], wanted, 0.0)
+        return relative(s[checked], wanted, 0.0)
 
     return VerbCase(name, n, 360 * len(box.triangles), call, compare)
 

@@ -123,10 +123,20 @@ def _plain(value: object) -> object:
 
 
 def _put_in_place(target: Path, write_to: Callable[[Path], object]) -> None:
-    """Write a new file or folder beside `target`, and move it there when it is whole; what stood there is removed."""
+    """Write a new file or folder beside `target`, and move it there when it is whole; what stood there is removed.
+
+    On any exception, Ctrl-C too, what stood there stands there again. OSError where the disk is full.
+    """
     with tempfile.TemporaryDirectory(prefix=f".{target.name}-", dir=target.parent) as name:
-        folder = Path(name)
-        write_to(folder / "new")
-        if target.is_dir():
-            target.rename(folder / "old")
-        (folder / "new").rename(target)
+        new, old = Path(name) / "new", Path(name) / "old"
+        try:
+            write_to(new)
+            if target.is_dir():
+                target.rename(old)
+            new.rename(target)
+        except BaseException as exc:
+            if old.exists():
+                old.rename(target)
+            if isinstance(exc, OSError) and exc.errno in output_paths.FULL:
+                raise output_paths.no_room(target, exc) from None
+            raise

@@ -194,16 +194,16 @@ def _corner(a: _Part, b: _Part, least: float) -> _Corner | None:
 
 def _parts(scene: Scene, wavelength: float) -> list[_Part]:
     """Facets with a coherent part, joined where they lie in one plane: the largest parts."""
-    some = np.flatnonzero(coherent(scene) & (scene.reflectivity > 0))
-    triangles = scene.triangles[some]
+    facet = np.flatnonzero(coherent(scene) & (scene.reflectivity > 0))
+    triangles = scene.triangles[facet]
     normals, areas = normals_and_areas(triangles)
     has_area = areas > 0
-    some, triangles, normals, areas = some[has_area], triangles[has_area], normals[has_area], areas[has_area]
-    if not len(some):
+    facet, triangles, normals, areas = facet[has_area], triangles[has_area], normals[has_area], areas[has_area]
+    if not len(facet):
         return []
     size = float(np.linalg.norm(np.diff(box(triangles.reshape(-1, 3)), axis=0)))
     largest = np.take_along_axis(normals, np.abs(normals).argmax(axis=1)[:, None], axis=1)
-    normals = np.where((largest < 0) & scene.two_sided[some, None], -normals, normals)
+    normals = np.where((largest < 0) & scene.two_sided[facet, None], -normals, normals)
     offsets = dot(triangles[:, 0], normals)
     keys = np.rint(np.column_stack([normals / STEEP, offsets / (FLAT * size)])).astype(np.int64) + 2**14
     group = np.unique(keys @ (1 << np.array([0, 15, 30, 45])), return_inverse=True)[1]
@@ -213,7 +213,7 @@ def _parts(scene: Scene, wavelength: float) -> list[_Part]:
     for number in large[total[large] >= (LEAST_SIZE * wavelength) ** 2].tolist():
         own = np.flatnonzero(group == number)
         first = own[areas[own].argmax()]
-        parts.append(_Part(triangles[own], areas[own], normals[first], float(offsets[first]), int(some[first])))
+        parts.append(_Part(triangles[own], areas[own], normals[first], float(offsets[first]), int(facet[first])))
     return parts
 
 

@@ -82,16 +82,16 @@ class ThinSheets:
     ) -> dict[frozenset[int], LitParts]:
         """Lit parts of pieces of the scene's facets, past everything but each set of sheets."""
         out = {}
-        for some in subsets(range(len(self))):
+        for subset in subsets(range(len(self))):
             solid = np.ones(len(self.scene.triangles), bool)
-            solid[self.rows[np.isin(self.group, list(some))]] = False
+            solid[self.rows[np.isin(self.group, list(subset))]] = False
             past = self.scene.triangles[solid]
-            out[some] = LitParts(device, pieces, past, antennas, max_bytes=max_bytes, progress=progress)
+            out[subset] = LitParts(device, pieces, past, antennas, max_bytes=max_bytes, progress=progress)
         return out
 
     def transmission(
         self,
-        some: frozenset[int],
+        subset: frozenset[int],
         centers: np.ndarray,
         sight: np.ndarray,
         frequencies: np.ndarray,
@@ -100,7 +100,7 @@ class ThinSheets:
         """What sheets let through of waves along lines of sight (n, 3) from an antenna to facets, about `centers`,
         m (n, 3): complex128 (n, m, 2, 2), on H and V of the antenna, relative to the waves without them; transposed,
         of waves back there."""
-        sheets, axes = sorted(some), np.stack(polarisation(sight, vertical), axis=1)
+        sheets, axes = sorted(subset), np.stack(polarisation(sight, vertical), axis=1)
         total = np.broadcast_to(np.eye(2, dtype=complex), (len(sight), len(frequencies), 2, 2))
         slope = sight @ self.normals[sheets].T
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -160,7 +160,7 @@ class SeenThrough:
 
     def between(self, first: int) -> SeenThrough:
         """The same, with pulses counted from `first`."""
-        return replace(self, lit_parts={some: parts.between(first) for some, parts in self.lit_parts.items()})
+        return replace(self, lit_parts={subset: parts.between(first) for subset, parts in self.lit_parts.items()})
 
     def means(self, p: int, antenna: np.ndarray, waves: np.ndarray) -> Iterator[tuple[frozenset[int], np.ndarray]]:
         """Sets of sheets, and means of exp(2j k u.rho) over the parts of facets that are seen through just these, from
@@ -172,13 +172,13 @@ class SeenThrough:
         phases = 2 * edges @ unit(antenna[0] - self.facets.mean(axis=1))[:, :, None]
         whole = triangle_mean(phases[:, 0] * waves, phases[:, 1] * waves)
         past: dict[frozenset[int], np.ndarray] = {}
-        for some, parts in self.lit_parts.items():
-            past[some] = np.where(parts.dark[:, None], 0, whole)
+        for subset, parts in self.lit_parts.items():
+            past[subset] = np.where(parts.dark[:, None], 0, whole)
             if parts.partly.any():
-                past[some][parts.partly] = parts.at(p, [antenna], waves)[1][0]
-        for some in self.lit_parts:
-            part = sum((-1) ** (len(some) - len(fewer)) * past[fewer] for fewer in subsets(some))
-            yield some, np.asarray(part)[None]
+                past[subset][parts.partly] = parts.at(p, [antenna], waves)[1][0]
+        for subset in self.lit_parts:
+            part = sum((-1) ** (len(subset) - len(fewer)) * past[fewer] for fewer in subsets(subset))
+            yield subset, np.asarray(part)[None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,7 +187,7 @@ class FacetsThrough:
 
     part: FacetSet
     sheets: ThinSheets
-    some: frozenset[int]
+    subset: frozenset[int]
 
     def __len__(self) -> int:
         return len(self.part)
@@ -209,7 +209,7 @@ class FacetsThrough:
         matrix = self.part.amplitudes(tx, rx, frequencies, POLARIZATIONS, vertical, light)
         matrix = matrix.reshape(*matrix.shape[:2], 2, 2)
         centers, up = centroids(self.triangles), tuple(vertical.tolist())
-        through = self.sheets.transmission(self.some, centers, unit(centers - tx), frequencies, up).swapaxes(0, 1)
+        through = self.sheets.transmission(self.subset, centers, unit(centers - tx), frequencies, up).swapaxes(0, 1)
         out = np.swapaxes(through, -1, -2) @ matrix @ through
         return np.asarray(out.reshape(*out.shape[:2], 4)[..., [POLARIZATIONS.index(name) for name in polarizations]])
 
@@ -223,4 +223,4 @@ def may_hide(scene: Scene) -> bool:
 def subsets(of: Iterable[int]) -> list[frozenset[int]]:
     """All sets of some of these numbers, smaller ones first."""
     numbers = sorted(of)
-    return [frozenset(some) for n in range(len(numbers) + 1) for some in combinations(numbers, n)]
+    return [frozenset(subset) for n in range(len(numbers) + 1) for subset in combinations(numbers, n)]

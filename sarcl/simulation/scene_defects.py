@@ -18,8 +18,8 @@ INSIDE = 0.75  # winding number of a closed surface: 1 within it, 0 outside, 1/2
 
 def warn_of_coincident(scene: Scene) -> None:
     """Warn of facets that lie on one another and are seen from one side: each of them counts."""
-    some = np.flatnonzero(scene.reflectivity > 0)
-    triangles = scene.triangles[some]
+    facet = np.flatnonzero(scene.reflectivity > 0)
+    triangles = scene.triangles[facet]
     if len(triangles) < 2:
         return
     bounds = box(triangles.reshape(-1, 3))
@@ -31,10 +31,10 @@ def warn_of_coincident(scene: Scene) -> None:
     one, other = triangles[order[near]], triangles[order[near + 1]]
     distance = np.linalg.norm(one[:, :, None] - other[:, None], axis=-1).min(axis=2).max(axis=1)
     sides = [cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0]) for t in (one, other)]
-    faces = (dot(*sides) > 0) | scene.two_sided[some[order[near]]] | scene.two_sided[some[order[near + 1]]]
+    faces = (dot(*sides) > 0) | scene.two_sided[facet[order[near]]] | scene.two_sided[facet[order[near + 1]]]
     twice = np.flatnonzero((distance < EQUAL * size) & faces & sides[0].any(axis=1))
     if len(twice):
-        first = sorted((int(some[order[near[twice[0]]]]), int(some[order[near[twice[0]] + 1]])))
+        first = sorted((int(facet[order[near[twice[0]]]]), int(facet[order[near[twice[0]] + 1]])))
         warn(
             f"{len(twice)} facets lie on others, such as facet {first[1]} on facet {first[0]}: each of them counts, so "
             "that their echo is twice as strong; leave them out (was a scene added to itself?)",

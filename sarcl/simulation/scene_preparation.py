@@ -180,8 +180,8 @@ def _shadow_terms(request: EchoRequest, scene: Scene, facets: Sequence[FacetSet]
 
 
 def warn_of_shapes(plan: ScenePlan) -> dict[str, Any]:
-    """Warn of posts and facets too large for what they stand for, and of right angles whose reflections are not
-    followed; returns what a report says of them."""
+    """Warn of posts that an image resolves, of facets too large for the curves that they approximate, and of right
+    angles whose reflections are not followed; returns what a report says of them."""
     if plan.subdivision is None:
         return {}
     seen = plan.seen

@@ -165,3 +165,24 @@ def test_a_missing_package_is_an_error_that_names_the_extra(tmp_path, monkeypatc
     with pytest.raises(ImportError, match=rf"needs the package {missing}: pip install sarcl\[xarray\]"):
         PLANE.save(tmp_path / ("image.nc" if missing == "h5netcdf" else "image.zarr"))
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("file", FILES)
+@pytest.mark.parametrize("error", [KeyboardInterrupt(), OSError(28, "No space left on device")])
+@pytest.mark.parametrize("moves", [0, 1])
+def test_what_stood_there_stays_where_a_file_cannot_be_finished(tmp_path, monkeypatch, file, error, moves):
+    PLANE.save(tmp_path / file)
+    rename = type(tmp_path).rename
+
+    def stopped(path, target):
+        if path.name == "new" or (path.name == file and not moves):
+            raise error
+        return rename(path, target)
+
+    monkeypatch.setattr(type(tmp_path), "rename", stopped)
+    with pytest.raises(
+        type(error), match="^$" if isinstance(error, KeyboardInterrupt) else "cannot write .* No space left"
+    ):
+        replace(PLANE, data=2 * PLANE.data).save(tmp_path / file)
+    assert [p.name for p in tmp_path.iterdir()] == [file]
+    assert_same(sarcl.read(tmp_path / file), PLANE)

@@ -140,9 +140,9 @@ class SheetEchoes:
             here = slice(first, first + step)
             block = replace(view, frequencies=view.frequencies[here])
             waves = 2 * np.pi * block.frequencies / SPEED_OF_LIGHT
-            for some, mean in self.seen.means(pulse, antennas.tx[pulse : pulse + 1], waves):
-                if some and mean.any():
-                    through = FacetsThrough(behind.part, behind.sheets, some)
+            for subset, mean in self.seen.means(pulse, antennas.tx[pulse : pulse + 1], waves):
+                if subset and mean.any():
+                    through = FacetsThrough(behind.part, behind.sheets, subset)
                     light = Light(np.arange(n), np.ones((1, n)), mean)
                     value, power = facet_samples(through, block, pulse, inside, light)
                     values[:, here] += value
