@@ -20,7 +20,7 @@ import numpy as np
 from ..base.constants import SPEED_OF_LIGHT
 from ..base.rows import spread_over
 from ..base.vectors import unit
-from ..scene.triangles import areas, bisect, centroids, cut, edges
+from ..scene.triangles import areas, bisect, centroids, cut, edges, normals
 from ..visibility.rays import SceneRays
 from . import facet_kinds
 from ._facet_norm import (
@@ -75,7 +75,7 @@ class CuttingError:
         self._wavenumber = 2 * np.pi * view.highest / SPEED_OF_LIGHT
         ends = antennas.tx, antennas.rx
         gain_ends = [(ends[0][row], ends[1][row]) for row in spread_over(len(ends[0]), GAIN_PULSES)]
-        self._norm = FacetNorm(scene, mirror, gain_ends, view.center, view.bandwidth)
+        self._norm = FacetNorm(scene, mirror, gain_ends, view.center, view.bandwidth, self._sees)
         self._ends = [(ends[0][row], ends[1][row]) for row in spread_over(len(ends[0]), ERROR_PULSES)]
         self._error_ends = [*self._ends, *steep]
         self._phase: float | None = None
@@ -89,6 +89,14 @@ class CuttingError:
         if view.shades is None or view.antennas.forward or len(view.scene.triangles) < 2:
             return None
         return SceneRays(view.shades, view.scene.triangles)
+
+    def _sees(self, places: np.ndarray, facets: np.ndarray, ends: Ends) -> np.ndarray:
+        """Whether antennas at `ends` see places, m (n, 3), on facets (n,) past others, from a side that reflects."""
+        scene = self._view.scene
+        n, to_tx, to_rx = normals(scene.triangles[facets]), unit(ends[0] - places), unit(ends[1] - places)
+        behind = scene.two_sided[facets] & turned(n, to_tx, to_rx, self._forward)
+        seen = lit_share(np.where(behind[:, None], -n, n), to_tx, to_rx, self._forward) > 0
+        return seen if self._rays is None else seen & ~_hidden(self._rays, places, facets, ends)
 
     def gain(self, edge: float) -> float:
         """Norm of facets cut to `edge`, m (inf: not at all), over that of the facets as they are given, those of one
@@ -216,9 +224,7 @@ class _Seen:
     def shaded(self, rays: SceneRays, facet: np.ndarray, ends: Ends) -> _Seen:
         """The same with what antennas at `ends` see past others of the scene's facets; facet  of each piece (n,)."""
         places = [centroids(triangles) for triangles, *_ in self.parts[1:]]
-        ways = ends[:1] if np.array_equal(*ends) else ends
-        hidden = [[rays.any_hit(p, np.tile(end, (len(p), 1)), leaving=facet) for end in ways] for p in places]
-        return replace(self, lit=[~np.any(one, axis=0) for one in hidden])
+        return replace(self, lit=[~_hidden(rays, one, facet, ends) for one in places])
 
     def echoes(self, k: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """S I of the pieces with linear phase, about their centroids, complex128 (n, n polarisations), and the same as
@@ -236,6 +242,12 @@ class _Seen:
             if partly.any():  # the linear phase of the piece, over its parts that are lit
                 linear += is_lit[:, None] * integrals(part, q, -(q * (centroids(part) - centroids(pieces))).sum(axis=1))
         return matrix * np.where(partly[:, None], linear, echo), finer
+
+
+def _hidden(rays: SceneRays, places: np.ndarray, facets: np.ndarray, ends: Ends) -> np.ndarray:
+    """Whether other facets hide places, m (n, 3), on facets (n,), from one of both antennas."""
+    ways = ends[:1] if np.array_equal(*ends) else ends
+    return np.any([rays.any_hit(places, np.tile(end, (len(places), 1)), leaving=facets) for end in ways], axis=0)
 
 
 def _halves(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

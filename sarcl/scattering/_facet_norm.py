@@ -9,7 +9,7 @@ docs/theory/facets.md derives it; tests/scattering/test_facet_errors.py measures
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from .mesh_quality.facet_groups import coplanar_groups
 from .physical_optics import triangle_integral
 
 Ends = tuple[np.ndarray, np.ndarray]  # positions of transmitter and receiver, m (3,) each
+Sees = Callable[[np.ndarray, np.ndarray, Ends], np.ndarray]  # whether antennas see places, m (n, 3), on facets (n,)
 FACETS = 200  # sampled facets
 PIECES = 2048  # sampled pieces of all these facets
 MOST_MEMBERS = 20_000  # facets of the planes that are added up; of planes with more, each facet counts alone
@@ -61,15 +62,21 @@ def lobe_wavenumbers(center: float, bandwidth: float, triangles: np.ndarray, of:
 
 
 class FacetNorm:
-    """Norms of coherent facets, estimated from the planes of up to 200 of them. Facets are perfect conductors here."""
+    """Norms of coherent facets, estimated from the planes of up to 200 of them. Facets are perfect conductors here.
 
-    def __init__(self, scene: Scene, mirror: np.ndarray, ends: Sequence[Ends], center: float, bandwidth: float) -> None:
+    Only what antennas see counts: an echo that is in shadow would make the errors of the others small beside it.
+    """
+
+    def __init__(
+        self, scene: Scene, mirror: np.ndarray, ends: Sequence[Ends], center: float, bandwidth: float, sees: Sees
+    ) -> None:
         """mirror  True for coherent facets (k,);  ends  antennas at some pulses;  center, bandwidth  Hz"""
-        self._ends, self._kept, self._mirror = ends, scene.kept, checksum(mirror)
+        self._ends, self._kept, self._mirror, self._sees = ends, scene.kept, checksum(mirror), sees
         group, self._weight = self._kept.of(
             ("sampled planes", self._mirror), lambda: _sampled_planes(scene, np.flatnonzero(mirror))
         )
-        self._triangles = scene.triangles[np.concatenate(group)] if group else np.zeros((0, 3, 3))
+        self._numbers = np.concatenate(group) if group else np.zeros(0, int)
+        self._triangles = scene.triangles[self._numbers]
         self._group = np.repeat(np.arange(len(group)), [len(g) for g in group])
         self._length = np.maximum.reduce(edges(self._triangles)) if group else np.zeros(0)
         if group:
@@ -122,12 +129,12 @@ class FacetNorm:
         )
         share = np.repeat(areas(triangles), each) / (each * areas(pieces))  # pieces that each represents
         powers, places = np.zeros(n), centroids(pieces)
-        planes = np.repeat(self._group[some], each)
+        planes, facets = np.repeat(self._group[some], each), np.repeat(self._numbers[some], each)
         waves = self._wavenumbers[planes, np.random.default_rng(3).integers(0, FREQUENCIES, len(pieces))]
         for ends in self._ends:
             q = unit(ends[0] - places) + unit(ends[1] - places)
             power = FREQUENCIES * np.abs(triangle_integral(pieces, waves[:, None] * q)) ** 2
-            powers += (share * power).reshape(n, each).sum(axis=1)
+            powers += (share * self._sees(places, facets, ends) * power).reshape(n, each).sum(axis=1)
         return powers
 
     def _whole_powers(self) -> tuple[np.ndarray, np.ndarray]:
@@ -147,13 +154,19 @@ class FacetNorm:
             middle[:, None] + (triangles - middle[:, None]) / shrink, max(flat, finest / shrink), 100 * WHOLE_PIECES
         )
         facets, planes, places = np.zeros(len(triangles)), np.zeros(n_planes), centroids(parts)
+        on_facets = middle[of] + shrink * (places - middle[of])
         for ends in self._ends:
+            seen = self._sees(on_facets, self._numbers[of], ends)
             q = unit(ends[0] - places) + unit(ends[1] - places)
             path = path_beyond(ends, middle[of], places - middle[of])
+            whole, lit = np.zeros(n_planes), np.zeros(n_planes)
             for k in self._wavenumbers[self._group[of]].T:
-                sums = group_sums(of, triangle_integral(parts, k[:, None] * q) * np.exp(-1j * k * path), len(triangles))
+                integrals = triangle_integral(parts, k[:, None] * q) * np.exp(-1j * k * path)
+                sums = group_sums(of, seen * integrals, len(triangles))
                 facets += np.abs(sums) ** 2
-                planes += np.abs(group_sums(self._group, sums, n_planes)) ** 2
+                lit += np.abs(group_sums(self._group, sums, n_planes)) ** 2
+                whole += np.abs(group_sums(self._group[of], integrals, n_planes)) ** 2
+            planes += np.minimum(whole, lit)  # a shadow that ends in steps of the parts' size has an echo of its own
         return facets, planes
 
 
