@@ -134,7 +134,8 @@ def focus(args: argparse.Namespace, job: Job) -> int:
     outputs = args.output or [f"{Path(args.raw[0]).stem}.png"]
     method = Method.of(args)
     check_pieces(args, outputs)
-    job.expect_named(outputs, formats.writing(*formats.OF_IMAGES), [*args.raw, *([args.grid] if args.grid else [])])
+    among = formats.writing(*formats.OF_IMAGES, "product")
+    job.expect_named(outputs, among, [*args.raw, *([args.grid] if args.grid else [])])
     _check_scale(args)
     place = _grid_options(args)
     grid = None if args.grid is None else load(args.grid).build_grid()
@@ -163,7 +164,15 @@ def focus(args: argparse.Namespace, job: Job) -> int:
         return 0
     running = {} if method.name != "backproject" else {"tile": args.tile, "resume": args.resume}
     _check_room(grid, outputs)
-    _focus(lambda out: method.image(raw, grid, devices, out=out, progress=job.progress, **running), outputs, args, job)
+    if any(formats.named(path, [formats.SICD]) for path in outputs):
+        from ..model.sicd.image_product import check
+
+        check(raw, grid)
+
+    def image(out: str | None) -> Image | None:
+        return method.image(raw, grid, devices, out=out, progress=job.progress, **running)
+
+    _focus(image, outputs, args, job, raw)
     return 0
 
 
@@ -249,7 +258,13 @@ def _compressed(raw: PhaseHistory, job: Job) -> PhaseHistory:
     return compress(raw)
 
 
-def _focus(make: Callable[[str | None], Image | None], outputs: list[str], args: argparse.Namespace, job: Job) -> None:
+def _focus(
+    make: Callable[[str | None], Image | None],
+    outputs: list[str],
+    args: argparse.Namespace,
+    job: Job,
+    raw: PhaseHistory | None = None,
+) -> None:
     """Make the image, in the first of `outputs` that takes it block by block, and write the other outputs."""
     from ..figures.decibels import write_png
 
@@ -266,6 +281,8 @@ def _focus(make: Callable[[str | None], Image | None], outputs: list[str], args:
             picture = image.show(args.floor_db, top_db=args.top_db, percentile=args.percentile)
             write_png(picture, path)
             scale = f". {picture.info['caption']}"
+        elif path != file and raw is not None and formats.named(path, [formats.SICD]):
+            image.save(path, collection=raw)
         elif path != file:
             image.save(path)
         job.say(f"wrote {path}{scale}")

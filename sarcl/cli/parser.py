@@ -56,9 +56,9 @@ def _add(group: Any, words: str, text: str, kind: Callable[[str], object] | None
     group.add_argument(*names, help=text, **options)
 
 
-def _image_endings() -> str:
+def _image_endings(*more: formats.Written) -> str:
     """Endings of files that images are written to."""
-    return formats.suggested(formats.writing(*formats.OF_IMAGES))
+    return formats.suggested(formats.writing(*formats.OF_IMAGES, *more))
 
 
 def _flag(group: object, words: str, text: str) -> None:
@@ -123,7 +123,7 @@ def _simulate(p: argparse.ArgumentParser) -> None:
 
 
 def _focus(p: argparse.ArgumentParser) -> None:
-    images = f"image to write, {_image_endings()}; repeatable (default: RAW's name with .png, here)"
+    images = f"image to write, {_image_endings('product')}; repeatable (default: RAW's name with .png, here)"
     _add(p, "raw RAW", f"{formats.readable('or')}; several are joined", nargs="+")
     _add(p, "-o --output IMAGE", images, action="append", default=[])
     _focus_grid(p)

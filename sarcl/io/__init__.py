@@ -12,7 +12,9 @@ For other folders:
     orbit_files    state vectors of orbit files in XML
     other_files    files that a mesh or an elevation model names: those of its own folder
     output_paths   output files: checked before the computation, written completely or not at all
+    sarkit_library  sarkit's modules for CPHD and SICD, and the files that they read in place
     sarcl_hdf5     sarcl's own HDF5 file: a phase history or an image, read and written as plain fields
+    sicd/          SICD files
     toml           TOML: line numbers of keys, and values written back as text
     xml/           XML files of others, and virtual rasters
 

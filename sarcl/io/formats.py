@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from ..base.types import PathLike
 
 Kind = Literal["phase history", "image"]
-Written = Literal["phase history", "image", "picture", "dataset"]
+Written = Literal["phase history", "image", "picture", "dataset", "product"]
 OF_IMAGES: tuple[Written, ...] = ("picture", "image", "dataset")  # what is written of an image
 T = TypeVar("T")
 Make = Callable[[Kind, Mapping[str, Any]], T]
@@ -43,7 +43,8 @@ class Format:
     name       for the list of what can be read
     file       the file of this folder that reads and writes it; none where other rooms do
     options    of `load` that this format takes; the others have no effect on it, or are applied to what was read
-    writes     what can be written: "picture" is made of an image by sarcl/figures, "dataset" by sarcl/model/_labelled
+    writes     what can be written: of an image, "picture" is made by sarcl/figures, "dataset" by sarcl/model/_labelled,
+               "product", with the collection that it was made of, by sarcl/model/sicd
     by_blocks  True where an image can be written block by block, and a killed run go on
     """
 
@@ -81,6 +82,7 @@ HDF5 = Format(
     by_blocks=True,
 )
 CPHD = Format((".cphd",), b"CPHD/", "CPHD files", "cphd._reading", ("channel", "polarization"))
+SICD = Format((".nitf", ".ntf", ".sicd"), b"NITF", "SICD files", "sicd._reading", writes=("product",))
 # recognised by their content: a folder, and HDF5 of another kind
 ZARR, NETCDF = (Format((ending,), file="labelled_files", writes=("dataset",)) for ending in (".zarr", ".nc"))
 FORMATS = (
@@ -88,6 +90,7 @@ FORMATS = (
     HDF5,
     Format((".mat",), b"MATLAB 5.0 MAT-file", "AFRL Gotcha .mat files (MATLAB 5)", "_gotcha", ("autofocus",)),
     CPHD,
+    SICD,
     ZARR,
     NETCDF,
 )
@@ -128,12 +131,13 @@ def check_writable(path: PathLike, n_bytes: int = 0) -> None:
 
 
 def load_open(file: IO[bytes], make: Make[T], **options: object) -> tuple[T, Format]:
-    """`load` of an open binary file, which CPHD alone is read from. ValueError for other formats."""
+    """`load` of an open binary file, which CPHD and SICD are read from. ValueError for other formats."""
     file.seek(0)
     head = file.read(len(CPHD.starts))
-    if head != CPHD.starts:
-        raise ValueError(f"the open file starts with {head!r:.40}; open files are read as CPHD alone: give a path")
-    return CPHD.functions.load(file, make, **options), CPHD
+    form = next((f for f in (CPHD, SICD) if head.startswith(f.starts)), None)
+    if form is None:
+        raise ValueError(f"the open file starts with {head!r:.40}; open files are read as CPHD or SICD: give a path")
+    return form.functions.load(file, make, **{n: v for n, v in options.items() if n in form.options}), form
 
 
 def writing(*kinds: Written, by_blocks: bool = False) -> list[Format]:

@@ -1,7 +1,8 @@
 """Images as xarray writes them: Zarr stores (x.zarr, a folder) and NetCDF files (x.nc); pip install sarcl[xarray].
 
 The datasets are those of model/_labelled.py, which hold every field of an Image. NetCDF has no complex numbers: there
-data is data_real and data_imag. A report of more than 60 kB, which no attribute of NetCDF holds, is a variable there.
+data is data_real and data_imag. A report or XML of more than 60 kB is a variable there: no
+attribute of NetCDF holds it.
 """
 
 from __future__ import annotations
@@ -68,9 +69,9 @@ def write(path: PathLike, dataset: xarray.Dataset) -> None:
     data = dataset["data"]
     if np.iscomplexobj(data):
         dataset = dataset.drop_vars("data").assign({"data_real": data.real, "data_imag": data.imag})
-    if len(dataset.attrs.get("report", "")) > LONGEST:
-        dataset = dataset.assign(report=((), dataset.attrs["report"]))
-        del dataset.attrs["report"]
+    for name in [name for name in ("report", "metadata") if len(dataset.attrs.get(name, "")) > LONGEST]:
+        dataset = dataset.assign({name: ((), dataset.attrs[name])})
+        del dataset.attrs[name]
     _put_in_place(target, lambda new: dataset.to_netcdf(new, engine="h5netcdf"))
 
 
@@ -112,6 +113,8 @@ def _fields(dataset: xarray.Dataset) -> dict[str, Any]:
     fields["grid"] = {"shape": values["data"].shape, **grid}
     if "report" in fields:
         fields["report"] = hdf5.report_of(str(fields["report"]))
+    if "metadata" in fields:
+        fields["metadata"] = str(fields["metadata"])
     return fields
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     import xarray
 
     from ..base.types import LazyRows, PathLike
+    from .sicd.image_product import EarthOptions
 
 FRAMES = ("local", "earth-fixed")
 
@@ -50,6 +51,7 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
     aperture      (k, 13), where rows saw different pixels: up to 256 rows, spread over all. Columns: tx and rx, m;
                   unit direction of the beam and cosine of half its angle (0 and -1: no beam); smallest and largest
                   half path of the range window, m; weight. What saw a position follows from them (`sarcl.measure`)
+    metadata      XML of the SICD file that it was read from
     frame         of positions: "earth-fixed" where the grid lies within 32 km of the ellipsoid, or "local"
     """
 
@@ -68,6 +70,7 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
     polarization: str | None = None
     frame: str | None = None
     aperture: NDArray[np.float64] | None = None
+    metadata: str | None = None
 
     if TYPE_CHECKING:  # types of the arguments; the fields above have the types after conversion
 
@@ -88,6 +91,7 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
             polarization: str | None = None,
             frame: str | None = None,
             aperture: ArrayLike | None = None,
+            metadata: str | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -114,8 +118,9 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
         if self.aperture is not None:
             rows = validation.array("image aperture", self.aperture, np.float64, ("k", 13))
             object.__setattr__(self, "aperture", rows)
-        if self.report is not None:
-            validation.instance("image report", self.report, Report)
+        for name, kind in (("report", Report), ("metadata", str)):
+            if getattr(self, name) is not None:
+                validation.instance(f"image {name}", getattr(self, name), kind)
         for name in ("window", "polarization"):
             arguments.text(f"image {name}", getattr(self, name))
         if self.frame is not None:
@@ -305,20 +310,44 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
         title: str | None = None,
         top_db: float | None = None,
         percentile: float | None = None,
+        **product: Unpack[EarthOptions],
     ) -> None:
-        """Write "name.png" (the picture of `show`), or "name.h5", "name.zarr" or "name.nc", which lose nothing.
+        """Write "name.png" (the picture of `show`), "name.h5", "name.zarr" or "name.nc", which lose nothing, or SICD.
 
         `sarcl.read` opens these. Zarr and NetCDF are the dataset of `to_xarray`, made in memory (sarcl[xarray]).
 
         floor_db, top_db, percentile  of a picture, as in `show`; the PNG's text entries top_db, floor_db and
                                       Description say what white and black are;  title  above the picture
         On any exception `path` is as it was.
+
+        SICD ("name.nitf", ".ntf", ".sicd"; sarcl[formats]) holds images on a plane, in complex64. Rows and columns are
+        turned by quarter turns, so that rows lead away from the antenna; `sarcl.read` gives the same pixels at the same
+        places. It takes
+
+        collection    the phase history that the image was made of
+        origin, axes  as in `PhaseHistory.save`: where local coordinates lie on the Earth
+        metadata      CollectorName, CoreName, ModeType, Classification, CollectionStart (UTC of time 0); for two
+                      platforms IlluminatorName; where the echoes lack them TxPol, RcvPol, TxTime (n_rows,). Names of a
+                      CPHD file that the echoes were read from need not be given. ModeID, CountryCode, AzAutofocus,
+                      RgAutofocus ("NO") and ImpRespWid ((2,), m; computed) may be
+        version       "1.3.0" unless given, "1.4.0" for two platforms
+
+        ValueError for what a SICD file must have and these lack, with the key of metadata= that gives it, and for
+        spectra that its polynomials do not describe (docs/theory/sicd.md).
         """
-        image_formats = formats.writing(*formats.OF_IMAGES)
+        image_formats = formats.writing(*formats.OF_IMAGES, "product")
         form = formats.named(arguments.path("path", path), image_formats)
         if form is None:
             endings = formats.suggested(image_formats, "'")
             raise ValueError(f"image path {str(path)!r} {formats.ending_of(path)}; choose {endings}")
+        if form is formats.SICD:
+            from ..io.sicd import writing
+            from .sicd.image_product import product_of
+
+            writing.save(path, product_of(self, **product), self.data)
+            return
+        if product:
+            raise ValueError(f"{', '.join(product)}: for SICD, and {str(path)!r} does not end in .nitf, .ntf or .sicd")
         if form.is_picture:
             from ..figures.decibels import write_png
 

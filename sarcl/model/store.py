@@ -64,6 +64,7 @@ def read(
     blur the others by 6 % and move the scene by 0.7 m.
     A CPHD file (pip install sarcl[formats]), by its path or an open binary file, gives a PhaseHistory in Earth-fixed
     coordinates, whose samples stay in the file. Its channels become rows where they have equally many samples.
+    A SICD file whose grid is a plane gives an Image, whose pixels stay in the file.
     external=True follows links and datasets of an HDF5 file that lead into other files, for files that you trust.
     channel, polarization   only these rows, as `PhaseHistory.select` takes them; of CPHD the name of a channel too
     FileNotFoundError names the missing file; ValueError the file that is of unknown format, truncated, damaged or

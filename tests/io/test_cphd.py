@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from earth_targets import AMPLITUDES, CASES, OFFSETS, ORIGIN, C, aircraft, two_way
 
 import sarcl
 
@@ -13,7 +14,6 @@ cphd = pytest.importorskip("sarkit.cphd", reason="no sarkit: pip install sarcl[f
 pytestmark = pytest.mark.filterwarnings("ignore:(read|open)_text is deprecated:DeprecationWarning")  # within sarkit
 verification = pytest.importorskip("sarkit.verification")
 
-C = 299792458.0
 METADATA = {
     "CollectorName": "sarcl",
     "CoreName": "targets",
@@ -22,82 +22,7 @@ METADATA = {
     "ReleaseInfo": "UNRESTRICTED",
     "CollectionStart": "2026-01-02T03:04:05.250000",
 }
-ORIGIN = 47.2, 8.5, 420.0  # latitude, longitude, height
-OFFSETS = np.array([[0.0, 0.0], [5.0, -4.0], [-7.0, 6.0]])  # m, of targets on the plane: x, y
-AMPLITUDES = np.array([1.0, 0.8, 1.2])
 VARIANTS = [(domain, sgn) for domain in ("FX", "TOA") for sgn in (-1, 1)]
-
-
-@dataclass(frozen=True)
-class Case:
-    """Echoes of known targets, and what saves them."""
-
-    raw: sarcl.PhaseHistory
-    targets: np.ndarray  # Earth-fixed, m (n, 3)
-    options: dict
-
-    @property
-    def resolution(self) -> float:
-        return C / 2 / float(self.raw.bandwidth[0])  # m, of range; the arcs are as long as the azimuth needs
-
-
-def two_way(tx, rx, x):
-    """Path from the sender to a point and on to the receiver, m (n,)."""
-    return np.linalg.norm(tx - x, axis=1) + np.linalg.norm(rx - x, axis=1)
-
-
-def echoes(tx, rx, targets, reference, time, velocities):
-    """The sum over targets, term by term, in float64."""
-    n, bandwidth, center = 96, 150e6, 9.6e9
-    f = center - bandwidth / 2 + (np.arange(n) + 0.5) * bandwidth / n
-    ranges = two_way(tx, rx, reference) / 2
-    delays = [2 * np.pi / C * (two_way(tx, rx, x) - 2 * ranges)[:, None] for x in targets]
-    samples = sum(a * np.exp(-1j * delay * f) for a, delay in zip(AMPLITUDES, delays, strict=True))
-    return sarcl.PhaseHistory(
-        samples.astype(np.complex64),
-        frequency=f[0],
-        frequency_step=bandwidth / n,
-        tx=tx,
-        rx=rx,
-        reference_range=ranges,
-        time=time,
-        tx_velocity=velocities[0],
-        rx_velocity=velocities[1],
-        polarization=np.full(len(tx), "VH"),
-    )
-
-
-def aircraft(is_bistatic):
-    """10 km away on a straight line, in local coordinates; a receiver on another aircraft."""
-    time = np.linspace(-1.0, 1.0, 161)
-    velocity = np.array([10.0, 100.0, 1.0])
-    tx = np.array([-8e3, 500.0, 6e3]) + time[:, None] * velocity
-    other = np.array([-5.0, 90.0, 0.0])
-    rx = np.array([-6e3, -4e3, 5e3]) + time[:, None] * other if is_bistatic else None
-    corner, axes = sarcl.wgs84.ecef(ORIGIN[1], ORIGIN[0], ORIGIN[2]), sarcl.wgs84.local_axes(ORIGIN[1], ORIGIN[0])
-    local = np.pad(OFFSETS, ((0, 0), (0, 1)))
-    velocities = np.tile(velocity, (161, 1)), np.tile(other if is_bistatic else velocity, (161, 1))
-    raw = echoes(tx, tx if rx is None else rx, local, np.zeros(3), time, velocities)
-    return Case(raw, corner + local @ axes, {"origin": ORIGIN})
-
-
-def orbit(is_bistatic):
-    """800 km high, Earth-fixed, the receiver where the echo arrives; or on a second satellite, behind the first."""
-    path = sarcl.Orbit.kepler(semi_major_axis=7178e3, eccentricity=0.001, inclination=1.7)
-    track = path.trajectory(start=10.0, prf=60.0, n_pulses=121)
-    center = path.geolocate([11.0], [950e3], side="right")[0]
-    longitude, latitude, _ = (float(v) for v in sarcl.wgs84.geodetic(center))
-    axes = sarcl.wgs84.local_axes(longitude, latitude)
-    targets = center + np.pad(OFFSETS, ((0, 0), (0, 1))) @ axes
-    time = track.times
-    delay = 2 * np.linalg.norm(track.positions - center, axis=1) / C
-    late = time + delay - (12.0 if is_bistatic else 0.0)
-    rx, rx_velocity = path.positions(late), path.velocities(late)
-    raw = echoes(track.positions, rx, targets, center, time, (track.velocities, rx_velocity))
-    return Case(raw, targets, {"metadata": {**METADATA, "SRPPos": center}})
-
-
-CASES = {"aircraft": aircraft, "orbit": orbit}
 
 
 QUICK = ("aircraft", True), ("orbit", False)  # with SLOW, both platforms, mono- and bistatic
@@ -114,8 +39,12 @@ def case(request):
     return CASES[name](is_bistatic)
 
 
+def words_of(case):
+    return METADATA if case.origin else {**METADATA, "SRPPos": case.targets[0]}
+
+
 def saved(case, path, **options):
-    case.raw.save(path, **{"metadata": METADATA, **case.options, **options})
+    case.raw.save(path, **{"metadata": words_of(case), "origin": case.origin, **options})
     return path
 
 
@@ -212,7 +141,7 @@ def test_targets_are_focused_and_located(case, tmp_path, domain, sgn):
 
 
 def test_the_default_grid_is_the_image_area(case, tmp_path):
-    words = {**METADATA, **case.options.get("metadata", {}), "ImageArea": ((-12, -9), (12, 9))}
+    words = {**words_of(case), "ImageArea": ((-12, -9), (12, 9))}
     path = saved(case, tmp_path / "x.cphd", metadata=words)
     grid = sarcl.default_grid(sarcl.read(path))
     sides = np.array(grid.shape) * grid.spacing

@@ -5,15 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ._library import Element
+from ..sarkit_library import Element, Refused, text_of
 
 # Letters of polarisations in a phase history by their names in CPHD
 ENDS = ("tx_channel", "rx_channel")  # of added parameters "tx_channel of NAME", the numbers of a channel's antennas
 LETTERS = {name: name for name in "HVXYSE"} | {"RHC": "R", "LHC": "L"}
-
-
-class Refused(Exception):
-    """What is wrong with a file, after its name, with a remedy."""
 
 
 @dataclass(frozen=True)
@@ -85,14 +81,6 @@ def chosen(channels: Sequence[Channel], channel: str | int | None, polarization:
         nameless = ", ".join(repr(c.name) for c in selection if c.polarization is None)
         raise Refused(f"has no known polarisation of channel {nameless}, unlike others: {_listed(channels)}; {remedy}")
     return selection
-
-
-def text_of(element: Element, path: str) -> str:
-    """The text of an element below; KeyError names one that is missing or empty."""
-    text = element.findtext("/".join(f"{{*}}{name}" for name in path.split("/")))
-    if text is None or not text.strip():
-        raise KeyError(f"it has no {path}")
-    return str(text).strip()
 
 
 def _listed(channels: Sequence[Channel]) -> str:

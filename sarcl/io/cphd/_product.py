@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...base import wgs84
+from ..sarkit_library import Element
 from ._channels import ENDS
-from ._library import Element
 
 if TYPE_CHECKING:
     from .writing import Collection

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import os
 from pathlib import Path
 from types import ModuleType
 from typing import IO, Any
@@ -12,9 +11,10 @@ import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
 from ..formats import Make, T
-from ._channels import Channel, Refused, channels_of, chosen, text_of
+from ..sarkit_library import Element, Reader, Refused, damage, opened, text_of
+from ..sarkit_library import library as sarkit_module
+from ._channels import Channel, channels_of, chosen
 from ._domains import baseband, n_frequencies
-from ._library import Element, Reader, cphd_library
 from ._signal_rows import Conversion, SignalRows
 
 HEADER_BYTES = 2**16  # of the header: ten lines of text
@@ -24,13 +24,6 @@ NEEDED = {"TxTime": False, "TxPos": False, "RcvPos": False, "SRPPos": False, "Tx
 NEEDED |= {"FX1": True, "FX2": True, "TOA1": False, "TOA2": False, "SC0": False, "SCSS": True, "aFDOP": False}
 NEGLIGIBLE = 0.01  # cycles of phase: 0.16 mm of range at 10 GHz
 ALL_ZERO = ("TxPos", "RcvPos", "SRPPos")  # positions at the centre of the Earth: a file that was not filled in
-
-
-class _File(io.BufferedReader):
-    """A file that is closed, without a warning, when nothing reads it any more."""
-
-    def __del__(self) -> None:
-        self.close()
 
 
 def load(
@@ -43,10 +36,8 @@ def load(
     ValueError, which names the file: truncated, damaged, another version, a compressed signal, a SGN that is neither
     +1 nor -1, per-vector parameters that are not finite or zero, channels that do not fit. ImportError without sarkit.
     """
-    library = cphd_library()
-    is_path = isinstance(source, os.PathLike)
-    name = repr(str(source)) if is_path else repr(getattr(source, "name", "the file object"))
-    file: IO[bytes] = _File(io.FileIO(str(source))) if isinstance(source, os.PathLike) else source
+    library = sarkit_module("cphd")
+    file, name = opened(source)
     try:
         try:
             reader = _reader(library, file)
@@ -61,14 +52,13 @@ def load(
         except Refused as exc:
             raise ValueError(f"{name} {exc}") from None
         except Exception as exc:  # of the library, of lxml and of text that is no number
-            words = str(exc.args[0]) if isinstance(exc, KeyError) and exc.args else f"{type(exc).__name__}: {exc}"
-            raise ValueError(f"{name} is truncated or damaged ({words}); copy it again") from exc
+            raise ValueError(f"{name} {damage(exc)}") from exc
         try:
             return make("phase history", fields)
         except ValueError as exc:
             raise ValueError(f"{name}: {exc}") from None
     except BaseException:
-        if is_path:
+        if file is not source:
             file.close()
         raise
 

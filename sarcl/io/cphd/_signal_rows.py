@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import os
 import threading
 from dataclasses import dataclass
 from typing import IO, NoReturn
 
 import numpy as np
 
+from ..sarkit_library import Reader, stamp
 from . import _domains
-from ._library import Reader
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +63,7 @@ class SignalRows:
         """reader  sarkit's, of the open file;  vectors  of each row, increasing;  n  frequencies of a row"""
         self._reader, self._file, self._channel, self._vectors, self._how = reader, file, channel, vectors, how
         self.shape = (len(vectors), n)
-        self._lock, self._stamp = threading.Lock(), _stamp(file)
+        self._lock, self._stamp = threading.Lock(), stamp(file)
         name = getattr(file, "name", None)
         self.filename = name if isinstance(name, str) and self._stamp is not None else None
 
@@ -101,14 +100,5 @@ class SignalRows:
         return repr(getattr(self._file, "name", "the file object"))
 
     def _check(self) -> None:
-        if _stamp(self._file) != self._stamp:
+        if stamp(self._file) != self._stamp:
             raise OSError(f"{self._name} has changed since it was opened; read it again with sarcl.read")
-
-
-def _stamp(file: IO[bytes]) -> tuple[int, int] | None:
-    """Size and time of change of an open file; None of objects that are no file of a disk."""
-    try:
-        state = os.fstat(file.fileno())
-    except (OSError, AttributeError, ValueError):  # ValueError: closed; io.UnsupportedOperation is an OSError
-        return None
-    return state.st_size, state.st_mtime_ns

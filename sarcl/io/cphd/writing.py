@@ -17,8 +17,8 @@ import numpy as np
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.types import PathLike
 from .. import output_paths
+from ..sarkit_library import library as sarkit_module
 from ._domains import records
-from ._library import cphd_library
 from ._product import SIZES, ChannelRows, kind_of, product
 
 OVERSAMPLING = 1.2  # of samples over the band or swath that is declared: the standard wants 1.1 at least, better 1.2
@@ -77,7 +77,7 @@ class Collection:
 
 def save(path: PathLike, collection: Collection, read: Callable[[int, int], np.ndarray]) -> None:
     """Write a collection to `path`, whole or not at all; read(start, stop) gives samples of rows."""
-    library = cphd_library()
+    library = sarkit_module("cphd")
     pvps = [_parameters(collection, library, each.rows) for each in collection.channels]
     tree = product(library, collection, pvps)
     n_rows = len(collection.time)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from ...base import validation, wgs84
 from ...base.constants import SPEED_OF_LIGHT
 from ...io.cphd.writing import OVERSAMPLING, ChannelRows, Collection
-from ..dates import date
+from ..product_words import LATER, POLARIZATIONS, Words, frame, per_row
 
 if TYPE_CHECKING:
     from ..phase_history import PhaseHistory
@@ -20,8 +20,6 @@ MODES = ("SPOTLIGHT", "STRIPMAP", "DYNAMIC STRIPMAP")
 REQUIRED = ("CollectorName", "CoreName", "ModeType", "Classification", "ReleaseInfo")
 OPTIONAL = ("IlluminatorName", "ModeID", "CountryCode", "CollectType")
 OTHERS = ("CollectionStart", "TxPol", "RcvPol", "SRPPos", "ImageArea", "TxTime", "TxVel", "RcvVel")
-POLARIZATIONS = {letter: letter for letter in "HVXY"} | {"R": "RHC", "L": "LHC"}
-LATER = {letter: letter for letter in "SE"}  # since version 1.1.0
 STEPS, MET = 20, 1e-7  # iterations, and error in m, of the point at which reference ranges meet
 SAME = 1.0  # m: farther from where the sender has moved on to, the receiver is on another platform
 
@@ -42,11 +40,11 @@ def collection_of(
     if sgn not in (-1, 1) or isinstance(sgn, bool):
         raise ValueError(f"sgn is {sgn!r}; give -1, or +1: then the samples are conjugated")
     _check_samples(raw)
-    words = _Words(metadata)
-    corner, local = _frame(raw, origin, axes)
-    time = _per_row(raw, words, "time", "TxTime", ())
+    words = Words("CPHD", metadata, (*REQUIRED, *OPTIONAL, *OTHERS))
+    corner, local = frame(raw.tx[0], "CPHD", origin, axes)
+    time = per_row(raw, words, "time", "TxTime", ())
     velocities = [
-        _per_row(raw, words, name, key, (3,)) @ local
+        per_row(raw, words, name, key, (3,)) @ local
         for name, key in (("tx_velocity", "TxVel"), ("rx_velocity", "RcvVel"))
     ]
     tx, rx = (corner + positions @ local for positions in (raw.tx, raw.rx))
@@ -83,36 +81,6 @@ def collection_of(
     )
 
 
-class _Words:
-    """What metadata= gives, by CPHD's names. ValueError for a name that is not one of them, or that is missing."""
-
-    def __init__(self, metadata: Mapping[str, ArrayLike | np.datetime64] | None) -> None:
-        self.values: dict[str, Any] = dict(metadata or {})
-        known = (*REQUIRED, *OPTIONAL, *OTHERS)
-        unknown = [key for key in self.values if key not in known]
-        if unknown:
-            raise ValueError(
-                f"metadata has {unknown[0]!r}, which is no name that CPHD lacks here; it takes {', '.join(known)}"
-            )
-
-    def need(self, key: str, why: str) -> Any:
-        """The value of a key; ValueError where there is none."""
-        if self.values.get(key) is None:
-            raise ValueError(f"{why}, which a CPHD file must have; give metadata={{{key!r}: ...}}")
-        return self.values[key]
-
-    def text(self, key: str) -> str:
-        """The text of a key, not empty."""
-        value = self.need(key, f"the echoes have no {key}")
-        if not isinstance(value, str) or not value.strip() or not value.isprintable():
-            raise ValueError(f"metadata[{key!r}] is {value!r:.80}; give a text of one line")
-        return value
-
-    def start(self) -> np.datetime64:
-        """CollectionStart: UTC of time 0."""
-        return date(self.need("CollectionStart", "the echoes have no date (UTC of time 0)"))
-
-
 def _check_samples(raw: PhaseHistory) -> None:
     """ValueError for what CPHD cannot say of samples."""
     if not raw.compressed:
@@ -123,46 +91,8 @@ def _check_samples(raw: PhaseHistory) -> None:
         )
 
 
-def _frame(raw: PhaseHistory, origin: ArrayLike | None, axes: ArrayLike | None) -> tuple[np.ndarray, np.ndarray]:
-    """Origin, m (3,), and axes (3, 3) of the frame of the echoes, Earth-fixed: position = origin + local @ axes."""
-    is_earth_fixed = wgs84.is_earth_fixed(raw.tx[0])
-    if origin is None:
-        if axes is not None or not is_earth_fixed:
-            raise ValueError(
-                "the echoes are in local coordinates, and CPHD is Earth-fixed; give origin=(latitude, longitude, "
-                "height) of their origin, degrees and m on WGS84 (axes=: east, north and up unless given)"
-            )
-        return np.zeros(3), np.eye(3)
-    if is_earth_fixed:
-        raise ValueError("origin places local coordinates, and the echoes are Earth-fixed already; leave it out")
-    latitude, longitude, height = validation.array("origin", origin, np.float64, (3,)).tolist()
-    if not -90 <= latitude <= 90 or not -180 <= longitude <= 360:
-        raise ValueError(
-            f"origin is ({latitude:g}, {longitude:g}, {height:g}); give latitude, longitude, deg, height, m"
-        )
-    if axes is None:
-        rows = wgs84.local_axes(longitude, latitude)
-    else:
-        rows = validation.array("axes", axes, np.float64, (3, 3))
-        if not np.allclose(rows @ rows.T, np.eye(3), atol=1e-9) or np.linalg.det(rows) < 0:
-            raise ValueError(
-                "axes are not three orthogonal unit vectors of a right-handed frame, Earth-fixed, x, y, z by row"
-            )
-    return wgs84.ecef(longitude, latitude, height), rows
-
-
-def _per_row(raw: PhaseHistory, words: _Words, name: str, key: str, tail: tuple[int, ...]) -> np.ndarray:
-    """A field of the rows, of the echoes or of metadata; ValueError where neither has it, or both."""
-    value = getattr(raw, name)
-    if value is not None and key in words.values:
-        raise ValueError(f"metadata has {key!r}, and the echoes have {name}; leave it out")
-    if value is None:
-        value = words.need(key, f"the echoes have no {name} (per row)")
-    return validation.array(f"metadata[{key!r}]", value, np.float64, (raw.n_rows, *tail))
-
-
 def _reference_point(
-    raw: PhaseHistory, words: _Words, corner: np.ndarray, local: np.ndarray, is_local: bool
+    raw: PhaseHistory, words: Words, corner: np.ndarray, local: np.ndarray, is_local: bool
 ) -> np.ndarray:
     """SRPPos, Earth-fixed, m (3,): given, or the centre of the image area, or on z = 0."""
     if words.values.get("SRPPos") is not None:
@@ -190,7 +120,7 @@ def _meeting_point(raw: PhaseHistory) -> np.ndarray:
 
 
 def _surface(
-    raw: PhaseHistory, words: _Words, point: np.ndarray, local: np.ndarray, is_local: bool
+    raw: PhaseHistory, words: Words, point: np.ndarray, local: np.ndarray, is_local: bool
 ) -> tuple[np.ndarray, np.ndarray]:
     """Axes (2, 3) of the plane of the scene through the reference point, and corners (2, 2) of its image area, m.
 
@@ -219,7 +149,7 @@ def _surface(
     return surface, area
 
 
-def _channels(raw: PhaseHistory, words: _Words, time: np.ndarray, version: str) -> tuple[ChannelRows, ...]:
+def _channels(raw: PhaseHistory, words: Words, time: np.ndarray, version: str) -> tuple[ChannelRows, ...]:
     """Rows of equal transmitting and receiving channel and polarisation, in order; their times must increase."""
     letters = POLARIZATIONS | (LATER if version == "1.1.0" else {})
     if raw.polarization is None:
