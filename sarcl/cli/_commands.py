@@ -167,7 +167,7 @@ def focus(args: argparse.Namespace, job: Job) -> int:
     if any(formats.named(path, [formats.SICD]) for path in outputs):
         from ..model.sicd.image_product import check
 
-        check(raw, grid)
+        check(raw, grid, has_beam=method.options.get("beam") is not None)
 
     def image(out: str | None) -> Image | None:
         return method.image(raw, grid, devices, out=out, progress=job.progress, **running)

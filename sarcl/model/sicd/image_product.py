@@ -123,17 +123,20 @@ def words_of(raw: PhaseHistory, metadata: Mapping[str, ArrayLike | np.datetime64
     return words
 
 
-def check(raw: PhaseHistory, grid: ImageGrid | None) -> None:
-    """Raises what `product_of` would for echoes without metadata=, origin= or axes=, as far as it is known before.
+def check(raw: PhaseHistory, grid: ImageGrid | None, has_beam: bool = False) -> None:
+    """Raises, before an image is made, what `product_of` would without arguments, as far as it is known.
 
-    grid  of the image; None: one of zero-Doppler times
+    grid  of the image; None: one of zero-Doppler times;  has_beam  not all rows see all pixels
     """
+    from ..image import Image
+
     if grid is None or not grid.is_plane:
         raise ValueError(LISTED)
-    words = words_of(raw, None)
-    corner, _ = frame(raw.tx[0], "SICD", None, None)
-    _tracks(raw, per_row(raw, words, "time", "TxTime", ()), raw.tx, raw.rx, corner + grid.bounds.mean(axis=0))
     sarkit_module("sicd")
+    words_of(raw, None)
+    frame(raw.tx[0], "SICD", None, None)
+    if not has_beam:
+        product_of(Image(np.broadcast_to(np.complex64(), grid.shape), grid), collection=raw)
 
 
 def _check_image(image: Image) -> None:
