@@ -165,9 +165,7 @@ def focus(args: argparse.Namespace, job: Job) -> int:
     running = {} if method.name != "backproject" else {"tile": args.tile, "resume": args.resume}
     _check_room(grid, outputs)
     if any(formats.named(path, [formats.SICD]) for path in outputs):
-        from ..model.sicd.image_product import check
-
-        check(raw, grid, has_beam=method.options.get("beam") is not None)
+        _check_product(raw, grid, has_beam=method.options.get("beam") is not None)
 
     def image(out: str | None) -> Image | None:
         return method.image(raw, grid, devices, out=out, progress=job.progress, **running)
@@ -204,6 +202,16 @@ def measure(args: argparse.Namespace, job: Job) -> int:
         write_png(responses.show(), args.plot)
         job.say(f"wrote {args.plot}")
     return 0
+
+
+def _check_product(raw: PhaseHistory, grid: ImageGrid | None, has_beam: bool) -> None:
+    """Refuse, before the work, images that no SICD file can describe, as far as that is known."""
+    import numpy as np
+
+    from ..model.image import Image
+    from ..model.sicd.image_product import check
+
+    check(None if grid is None else Image(np.broadcast_to(np.complex64(), grid.shape), grid), raw, has_beam)
 
 
 def _check_room(grid: ImageGrid | None, outputs: list[str]) -> None:

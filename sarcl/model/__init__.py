@@ -15,7 +15,6 @@ For other folders:
     orbit             Orbit: where a satellite is, Earth-fixed, and what it sees
     phase_history     PhaseHistory: echoes by row and frequency, with their geometry
     pointing          attitudes of tracks: spotlight, strip map, fixed
-    product_words     what metadata= gives for files of standards, and the place of local coordinates on the Earth
     radar             Radar: the radar equation as named factors
     row_positions     positions of both antennas in each row, from a track; of orbits at the echo's arrival
     sicd/             images as SICD files

@@ -2,6 +2,7 @@
 
 For other folders:
 
+    names          names of the collection in the XML of a file
     writing        a collection as a file
 
 For this folder alone:

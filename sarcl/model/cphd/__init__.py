@@ -3,4 +3,5 @@
 For other folders:
 
     collection     a phase history as the collection of a CPHD file; what is missing is refused
+    words          what metadata= gives for CPHD and SICD, and where local coordinates lie on the Earth
 """

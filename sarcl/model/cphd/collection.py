@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from ...base import validation, wgs84
 from ...base.constants import SPEED_OF_LIGHT
 from ...io.cphd.writing import OVERSAMPLING, ChannelRows, Collection
-from ..product_words import LATER, POLARIZATIONS, Words, frame, per_row
+from .words import LATER, POLARIZATIONS, Words, frame, per_row
 
 if TYPE_CHECKING:
     from ..phase_history import PhaseHistory

@@ -18,13 +18,12 @@ from ...base.rows import spread_over
 from ...io.cphd.names import names_of
 from ...io.sarkit_library import library as sarkit_module
 from ...io.sicd.writing import Direction, Order, Product, Tracks
-from ..product_words import LATER, POLARIZATIONS, Words, frame, per_row
+from ..cphd.words import LATER, POLARIZATIONS, Words, frame, per_row
 from . import _polynomials
 from ._spectrum import MOST_ROWS, Aperture
 
 if TYPE_CHECKING:
     from ..image import Image
-    from ..image_grid import ImageGrid
     from ..phase_history import PhaseHistory
 
 MODES = ("SPOTLIGHT", "STRIPMAP", "DYNAMIC STRIPMAP")
@@ -123,20 +122,19 @@ def words_of(raw: PhaseHistory, metadata: Mapping[str, ArrayLike | np.datetime64
     return words
 
 
-def check(raw: PhaseHistory, grid: ImageGrid | None, has_beam: bool = False) -> None:
+def check(image: Image | None, raw: PhaseHistory, has_beam: bool = False) -> None:
     """Raises, before an image is made, what `product_of` would without arguments, as far as it is known.
 
-    grid  of the image; None: one of zero-Doppler times;  has_beam  not all rows see all pixels
+    image  of any pixels, on the grid; None: on one of zero-Doppler times;  has_beam  not all rows see all pixels
     """
-    from ..image import Image
-
-    if grid is None or not grid.is_plane:
+    if image is None:
         raise ValueError(LISTED)
+    _check_image(image)
     sarkit_module("sicd")
     words_of(raw, None)
     frame(raw.tx[0], "SICD", None, None)
     if not has_beam:
-        product_of(Image(np.broadcast_to(np.complex64(), grid.shape), grid), collection=raw)
+        product_of(image, collection=raw)
 
 
 def _check_image(image: Image) -> None:

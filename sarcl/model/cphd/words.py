@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base import validation, wgs84
-from .dates import date
+from ...base import validation, wgs84
+from ..dates import date
 
 if TYPE_CHECKING:
-    from .phase_history import PhaseHistory
+    from ..phase_history import PhaseHistory
 
 # polarisations by their letters, as CPHD and SICD name them; and those of their later versions
 POLARIZATIONS = {letter: letter for letter in "HVXY"} | {"R": "RHC", "L": "LHC"}
