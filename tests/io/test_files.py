@@ -671,11 +671,12 @@ def test_a_new_format_is_one_file_and_one_line_of_the_table(tmp_path, monkeypatc
     image.save(tmp_path / "a.toy")
     again = sarcl.read(tmp_path / "a.toy")
     assert same(again.data, image.data) and again.gain == 3.0 and same(again.grid.positions, image.grid.positions)
-    with pytest.raises(ValueError, match=r"choose '\.png', '\.h5', '\.zarr', '\.nc' or '\.toy'"):
+    with pytest.raises(ValueError, match=r"choose '\.png', '\.h5', '\.nitf', '\.zarr', '\.nc' or '\.toy'"):
         image.save(tmp_path / "a.bmp")
     (tmp_path / "b.toy").write_bytes(b"12345")
     with pytest.raises(
-        ValueError, match=r"although its name ends in '\.toy'; sarcl reads .*5\), CPHD files and toys \(\.toy\)"
+        ValueError,
+        match=r"although its name ends in '\.toy'; sarcl reads .*5\), CPHD files, SICD files and toys \(\.toy\)",
     ):
         sarcl.read(tmp_path / "b.toy")
     with pytest.raises(SystemExit):
