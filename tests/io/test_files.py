@@ -682,7 +682,7 @@ def test_a_new_format_is_one_file_and_one_line_of_the_table(tmp_path, monkeypatc
     with pytest.raises(SystemExit):
         main(["focus", "--help"])
     said = " ".join(capsys.readouterr().out.split())
-    assert "toys (.toy)" in said and ".png, .h5, .zarr, .nc or .toy" in said
+    assert "toys (.toy)" in said and ".png, .h5, .nitf, .zarr, .nc or .toy" in said
     assert formats.named("a.toy", formats.writing("image", by_blocks=True)) is None
 
 
