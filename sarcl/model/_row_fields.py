@@ -21,7 +21,7 @@ PER_ROW: dict[str, tuple[DTypeLike, tuple[int, ...]]] = {
 }
 
 
-LEAST_STEP = 1e-20  # Hz: a range window of 1e28 m
+LEAST_STEP = 0.5  # Hz: a range window of 3e8 m, which holds 1e8 m on either side of the reference, and its pulses
 
 
 class RowFields(TypedDict, total=False):

@@ -123,9 +123,10 @@ class PhaseHistory(NotebookTable):
                 "it must be positive: reverse the samples of a falling sweep"
             )
         if not (self.frequency_step >= LEAST_STEP).all():
+            step = float(self.frequency_step.min())
             raise ValueError(
-                f"frequency_step is {self.frequency_step.min():g} Hz; steps are at least {LEAST_STEP:g} Hz, below "
-                "which range windows are longer than float32 counts"
+                f"frequency_step is {step:g} Hz, a swath of {constants.SPEED_OF_LIGHT / 2 / step:.2g} m; steps are at "
+                f"least {LEAST_STEP:g} Hz, swaths 3e8 m: is it in MHz? Give {1e6 * step:g}"
             )
         if not (self.frequency > 0).all():
             bad = int(np.argmin(self.frequency))
