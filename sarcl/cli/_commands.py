@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from ..model.image import Image
     from ..model.image_grid import ImageGrid
     from ..model.phase_history import PhaseHistory
+    from ._methods import Method
 
 HEAD = ("", "", "device", "platform", "kind", "works", "fp64", "vector", "memory", "largest buffer")
 
@@ -165,7 +166,7 @@ def focus(args: argparse.Namespace, job: Job) -> int:
     running = {} if method.name != "backproject" else {"tile": args.tile, "resume": args.resume}
     _check_room(grid, outputs)
     if any(formats.named(path, [formats.SICD]) for path in outputs):
-        _check_product(raw, grid, has_beam=method.options.get("beam") is not None)
+        _check_product(raw, grid, method)
 
     def image(out: str | None) -> Image | None:
         return method.image(raw, grid, devices, out=out, progress=job.progress, **running)
@@ -204,14 +205,17 @@ def measure(args: argparse.Namespace, job: Job) -> int:
     return 0
 
 
-def _check_product(raw: PhaseHistory, grid: ImageGrid | None, has_beam: bool) -> None:
+def _check_product(raw: PhaseHistory, grid: ImageGrid | None, method: Method) -> None:
     """Refuse, before the work, images that no SICD file can describe, as far as that is known."""
     import numpy as np
 
     from ..model.image import Image
     from ..model.sicd.image_product import check
 
-    check(None if grid is None else Image(np.broadcast_to(np.complex64(), grid.shape), grid), raw, has_beam)
+    if grid is None or method.name != "backproject":
+        raise ValueError(f"SICD describes images by backproject; leave out --method {method.name}, or write .h5")
+    empty = Image(np.broadcast_to(np.complex64(), grid.shape), grid)
+    check(empty, raw, has_beam=method.options.get("beam") is not None)
 
 
 def _check_room(grid: ImageGrid | None, outputs: list[str]) -> None:

@@ -320,9 +320,9 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
                                       Description say what white and black are;  title  above the picture
         On any exception `path` is as it was.
 
-        SICD ("name.nitf", ".ntf", ".sicd"; sarcl[formats]) holds images on a plane, in complex64. Rows and columns are
-        turned by quarter turns, so that rows lead away from the antenna; `sarcl.read` gives the same pixels at the same
-        places. It takes
+        SICD ("name.nitf", ".ntf", ".sicd"; sarcl[formats]) holds images by `backproject` on a plane, in complex64. Rows
+        and columns are turned by quarter turns, so that rows lead away from the antenna; `sarcl.read` gives the same
+        pixels at the same places. It takes
 
         collection    the phase history that the image was made of
         origin, axes  as in `PhaseHistory.save`: where local coordinates lie on the Earth

@@ -35,8 +35,6 @@ FARTHEST = 0.3  # m, by which a polynomial may miss a track
 FIT = 1e-3, 0.02  # of a bandwidth or dwell: error at which a fit stops, and that is the most
 LEAST_SHARE = 0.5  # of the largest bandwidth in an image, which the file gives for all of its pixels
 
-LISTED = "SICD holds images on a plane, and this grid lists its points; focus on ImageGrid.plane, or save it as .h5"
-
 
 class EarthOptions(TypedDict, total=False):
     """Arguments of `Image.save` for SICD files, as its docstring has them."""
@@ -122,13 +120,11 @@ def words_of(raw: PhaseHistory, metadata: Mapping[str, ArrayLike | np.datetime64
     return words
 
 
-def check(image: Image | None, raw: PhaseHistory, has_beam: bool = False) -> None:
+def check(image: Image, raw: PhaseHistory, has_beam: bool = False) -> None:
     """Raises, before an image is made, what `product_of` would without arguments, as far as it is known.
 
-    image  of any pixels, on the grid; None: on one of zero-Doppler times;  has_beam  not all rows see all pixels
+    image  of any pixels, on the grid;  has_beam  not all rows see all pixels
     """
-    if image is None:
-        raise ValueError(LISTED)
     _check_image(image)
     sarkit_module("sicd")
     words_of(raw, None)
@@ -139,8 +135,17 @@ def check(image: Image | None, raw: PhaseHistory, has_beam: bool = False) -> Non
 
 def _check_image(image: Image) -> None:
     """ValueError for an image that SICD cannot hold."""
+    if image.report is not None and image.report.plan.get("method") == "polar format":
+        raise ValueError(
+            "polar_format takes wavefronts for planes: its image has another spectrum and shows points beside their "
+            "pixels, which the metadata would deny; use backproject"
+        )
     if not image.grid.is_plane:
-        raise ValueError(LISTED)
+        raise ValueError(
+            "SICD holds images on a plane, and this grid lists its points; focus on ImageGrid.plane, or save it as .h5"
+        )
+    if min(image.shape) < 2:
+        raise ValueError(f"SICD holds images of two rows and columns or more, and this one has {image.shape}")
     if not image.is_complex:
         raise ValueError("SICD holds complex images, and this one is real (multilooked); save it before, or as .h5")
 
