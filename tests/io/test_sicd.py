@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from dataclasses import replace
 
 import numpy as np
@@ -367,3 +368,20 @@ def test_weights_without_a_name_need_a_width(tmp_path):
     with pytest.raises(ValueError, match="'ImpRespWid'"):
         saved(case, image, tmp_path / "x.nitf")
     saved(case, image, tmp_path / "x.nitf", metadata={**METADATA, "ImpRespWid": (1.1, 0.7)})
+
+
+def test_images_of_several_segments_are_written_and_read(tmp_path, monkeypatch):
+    """NITF holds 10 GB in a segment: here 20 kB; rows lead east, away from the antenna."""
+    monkeypatch.setattr(importlib.import_module("sarkit.sicd._constants"), "IS_SIZE_MAX", 20_000)
+    monkeypatch.setattr(importlib.import_module("sarcl.io.sicd.writing"), "BLOCK_BYTES", 7_000)
+    case, shape = aircraft(False), (30, 200)
+    values = np.random.default_rng(5).normal(size=(2, *shape)).astype("f4")
+    image = sarcl.Image(values[0] + 1j * values[1], sarcl.ImageGrid.plane(shape=shape, spacing=0.3))
+    path = saved(case, image, tmp_path / "x.nitf")
+    with open(path, "rb") as file, sicd.NitfReader(file) as reader:
+        assert len(reader.jbp["ImageSegments"]) == 3
+    back = sarcl.read(path)
+    corner, axes = frame(case)
+    i, j = np.rint(back.grid.index(corner + image.grid.positions @ axes)).astype(int).reshape(-1, 2).T
+    assert np.asarray(back)[i, j].tobytes() == image.data.tobytes()
+    np.testing.assert_array_equal(back.data[60:150], np.asarray(back)[60:150])
