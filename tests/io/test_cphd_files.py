@@ -434,3 +434,14 @@ def test_polarization_and_channel_choose_rows_of_other_files_too(path, tmp_path)
     assert sarcl.read(tmp_path / "b.h5", channel="0").n_rows == 2 * N
     with pytest.raises(ValueError, match="polarization 'VV' is not in these data"):
         sarcl.read(tmp_path / "b.h5", polarization="VV")
+
+
+def test_range_and_doppler_that_are_coupled_are_told(path, tmp_path):
+    """aFRR1 dv B of a resolution: in the corners dv = 100 m/s times 4 m/10 km, B = 94 MHz."""
+    tree, signal, pvp = parts(path)
+    pvp = pvp.copy()
+    pvp["aFRR1"] = 2.6e-12
+    sarcl.read(written(tmp_path / "y.cphd", tree, signal, pvp))  # 1e-5 of a resolution: no warning, which is an error
+    pvp["aFRR1"] = 1e-7
+    with pytest.warns(sarcl.SarclWarning, match=r"coupled \(aFRR1\).* by 3[78]\.\d% of the range resolution"):
+        sarcl.read(written(tmp_path / "y.cphd", tree, signal, pvp))

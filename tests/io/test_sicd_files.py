@@ -150,7 +150,7 @@ def test_planes_that_show_the_scene_elsewhere_are_told(base, tmp_path):
     }
     changes = {"Grid__Type": "RGAZIM", "ImageFormation__ImageFormAlgo": "PFA", "Grid__Col__SS": "20.0"}
     path = written(tmp_path / "x.nitf", metadata, pixels, **changes)
-    with pytest.warns(UserWarning, match=r"RGAZIM.* up to [\d.e+]+ m from where"):
+    with pytest.warns(sarcl.SarclWarning, match=r"RGAZIM.* up to [\d.e+]+ m from where"):
         sarcl.read(path)
 
 

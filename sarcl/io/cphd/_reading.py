@@ -10,6 +10,7 @@ from typing import IO, Any
 import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
+from ...base.errors import warn
 from ..formats import Make, T
 from ..sarkit_library import Element, Reader, Refused, damage, opened, text_of
 from ..sarkit_library import library as sarkit_module
@@ -22,6 +23,7 @@ SPACE = "http://api.nsgreg.nga.mil/schema/cphd/"
 # Per-vector parameters that must be finite; positive where True
 NEEDED = {"TxTime": False, "TxPos": False, "RcvPos": False, "SRPPos": False, "TxVel": False, "RcvVel": False}
 NEEDED |= {"FX1": True, "FX2": True, "TOA1": False, "TOA2": False, "SC0": False, "SCSS": True, "aFDOP": False}
+COUPLING = 0.1  # of a range resolution: a shift from which on the coupling of range and Doppler is told
 NEGLIGIBLE = 0.01  # cycles of phase: 0.16 mm of range at 10 GHz
 ALL_ZERO = ("TxPos", "RcvPos", "SRPPos")  # positions at the centre of the Earth: a file that was not filled in
 
@@ -44,15 +46,22 @@ def load(
             root = reader.metadata.xmltree.getroot()
             _check_kind(root)
             selection = chosen(channels_of(root), channel, polarization)
-            parts = [_rows(reader, file, root, each) for each in selection]
+            area = _image_area(library, reader.metadata.xmltree)
+            parts = [_rows(reader, file, root, each, area) for each in selection]
+            coupling = max(part.pop("coupling") for part in parts)
             fields = {field: _joined([part[field] for part in parts]) for field in parts[0]}
             if np.array_equal(fields["rx"], fields["tx"]):
                 fields["rx"] = None
-            fields |= {"image_area": _image_area(library, reader.metadata.xmltree), "metadata": _text(reader)}
+            fields |= {"image_area": area, "metadata": _text(reader)}
         except Refused as exc:
             raise ValueError(f"{name} {exc}") from None
         except Exception as exc:  # of the library, of lxml and of text that is no number
             raise ValueError(f"{name} {damage(exc)}") from exc
+        if coupling > COUPLING:
+            warn(
+                f"{name}: range and Doppler are coupled (aFRR1), which is not corrected: targets in the corners of the "
+                f"image area are moved by {coupling:.1%} of the range resolution"
+            )
         try:
             return make("phase history", fields)
         except ValueError as exc:
@@ -108,8 +117,11 @@ def _check_kind(root: Element) -> None:
         raise Refused(f"has SGN {sign!r:.20}, wanted +1 or -1: the sign of the phase of a return is not known")
 
 
-def _rows(reader: Reader, file: IO[bytes], root: Element, channel: Channel) -> dict[str, Any]:
-    """Fields of the rows of a channel, but those whose SIGNAL is 0: vectors without a signal."""
+def _rows(reader: Reader, file: IO[bytes], root: Element, channel: Channel, area: np.ndarray) -> dict[str, Any]:
+    """Fields of the rows of a channel, but those whose SIGNAL is 0: vectors without a signal; and "coupling", as below.
+
+    area  `_image_area`
+    """
     pvp = reader.read_pvps(channel.name)
     pvp = pvp.astype(pvp.dtype.newbyteorder("="))
     vectors = np.arange(channel.n_vectors)
@@ -164,7 +176,23 @@ def _rows(reader: Reader, file: IO[bytes], root: Element, channel: Channel) -> d
         "tx_velocity": np.array(pvp["TxVel"]),
         "rx_velocity": np.array(pvp["RcvVel"]),
         "compressed": True,
+        "coupling": _coupling(pvp, area),
     }
+
+
+def _coupling(pvp: np.ndarray, area: np.ndarray) -> float:
+    """Largest shift in the corners of the image area by aFRR1, in range resolutions c/(2 B): aFRR1 dv B."""
+    if not pvp["aFRR1"].any():
+        return 0.0
+    corners = [area[0] + i * area[1] + j * area[2] for i in (-1, 1) for j in (-1, 1)]
+
+    def rate(points: np.ndarray) -> np.ndarray:
+        """Mean range rate of sender and receiver to points, m/s."""
+        lines = [(pvp[f"{end}Pos"] - points, pvp[f"{end}Vel"]) for end in ("Tx", "Rcv")]
+        return np.mean([np.einsum("ij,ij->i", v, r) / np.linalg.norm(r, axis=1) for r, v in lines], axis=0)
+
+    shift = [np.abs(pvp["aFRR1"] * (pvp["FX2"] - pvp["FX1"]) * (rate(x) - rate(pvp["SRPPos"]))).max() for x in corners]
+    return float(np.nanmax(shift))
 
 
 def _scale(pvp: np.ndarray) -> np.ndarray:

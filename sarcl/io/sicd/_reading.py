@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import io
-import warnings
 from pathlib import Path
 from types import ModuleType
 from typing import IO, Any
 
 import numpy as np
 
+from ...base.errors import warn
 from ..formats import Make, T
 from ..sarkit_library import Element, Reader, Refused, damage, opened, text_of
 from ..sarkit_library import library as sarkit_module
@@ -41,11 +41,10 @@ def load(source: Path | IO[bytes], make: Make[T]) -> T:
             raise ValueError(f"{name} {damage(exc)}") from exc
         distance = _distance(library, reader, fields["grid"])
         if distance > FAR * max(fields["grid"]["spacing"]):
-            warnings.warn(
+            warn(
                 f"{name}: this grid ({text_of(reader.metadata.xmltree.getroot(), 'Grid/Type')}) shows points of the "
                 f"scene up to {distance:.2g} m from where its plane has their pixels; sarkit.sicd.projection has exact "
-                "places",
-                stacklevel=5,
+                "places"
             )
         try:
             return make("image", fields)
