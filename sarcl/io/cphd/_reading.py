@@ -118,10 +118,7 @@ def _check_kind(root: Element) -> None:
 
 
 def _rows(reader: Reader, file: IO[bytes], root: Element, channel: Channel, area: np.ndarray) -> dict[str, Any]:
-    """Fields of the rows of a channel, but those whose SIGNAL is 0: vectors without a signal; and "coupling", as below.
-
-    area  `_image_area`
-    """
+    """Fields of the rows of a channel, but those whose SIGNAL is 0: vectors without a signal; and their `_coupling`."""
     pvp = reader.read_pvps(channel.name)
     pvp = pvp.astype(pvp.dtype.newbyteorder("="))
     vectors = np.arange(channel.n_vectors)
