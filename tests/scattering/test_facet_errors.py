@@ -191,8 +191,8 @@ def test_the_error_between_frequencies_is_no_more_than_samples_say(material, edg
 
 @pytest.mark.parametrize("angle", [20, 30, 45, 60])
 def test_a_bright_facet_in_shadow_hides_no_errors(angle):
-    """A tilted triangle from 30 m, and behind it one along the wavefronts, whose echo would be 10, 20, 50 and 2300 times
-    as strong."""
+    """A tilted triangle from 30 m, and behind it one along the wavefronts, whose echo would be 10, 20, 50 and
+    2300 times as strong."""
     c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
     screen = np.array([[-1.5 * c, -1.2, 1.5 * s], [1.5 * c, -1.2, -1.5 * s], [0, 1.8, 0.1]])
     hidden = np.array([[-0.4, -0.6, -3], [0.4, -0.6, -3], [0, 0.2, -3]])
