@@ -3,6 +3,10 @@
 // macros    none
 // reference: sarcl/imaging/tiling/plane.py:PlaneTiling.place
 
+#undef VW
+#define VW 1
+#include "common.clh"
+
 typedef struct {
     ulong pixels;
     int across, high, wide, columns;
@@ -30,4 +34,16 @@ __kernel void move(__global const float *restrict from, ulong n_from, __global c
     size_t per_tile = get_global_size(0), i = get_global_id(1) * per_tile + get_global_id(0);
     size_t o = (size_t)slot[get_global_id(1)] * per_tile + get_global_id(0);
     for (int plane = 0; plane < 4; plane++) to[plane * n_to + o] = from[plane * n_from + i];
+}
+
+// Adds the sums of parts of the pulses to those of an image, one part after another. global size (pixels)
+//   parts    (n_parts, 4, pixels);  totals (4, pixels): re, im, and their rounding errors
+__kernel void add_parts(__global const float *restrict parts, int n_parts, __global float *restrict totals) {
+    size_t pixels = get_global_size(0), i = get_global_id(0);
+    for (int p = 0; p < n_parts; p++, parts += 4 * pixels)
+        for (int plane = 0; plane < 2; plane++) {
+            __global float *total = totals + plane * pixels;
+            add_compensated(total, total + 2 * pixels, i, parts[plane * pixels + i]);
+            total[2 * pixels + i] += parts[(plane + 2) * pixels + i];
+        }
 }

@@ -3,8 +3,9 @@
 //
 //   delta(i, j) = A_i + j beta + rest_ij,    I_ij += sum_b W_b(i) T(n_i + b + FINE j)
 //
-// A work-group adds up a tile. For each pulse its items make T and the weights of all lines in local memory, then each item
-// adds LINE_TAPS products to each of its pixels, which stay in registers: no gather, sine, cosine or wide number per pixel.
+// A work-group adds up a tile, or its part of the pulses. For each pulse its items make T and the weights of all lines in local
+// memory, then each item adds LINE_TAPS products to each of its pixels, which stay in registers: no gather, sine, cosine or
+// wide number per pixel.
 //
 // source    backproject_lines.cl, also for pulses that are added pixel by pixel. The sums are kept without the rest_ij of a
 //           group of pulses, that of its middle pulse: where groups change, and after CHUNK pulses, sums are turned by the
@@ -13,6 +14,7 @@
 // macros    FP64, BISTATIC, WRAP, TAPS, TERMS, ORDER, BEAM, SIDE, FINE, LINE_TAPS, LINE_TERMS, GROUP as in
 //           backproject_lines.cl;  SHARED 1, see line_geometry.clh
 //           ITEMS     work-items of a group;  CHUNK  pulses added in float32 before they join the compensated total
+//           REGISTERS  most registers of a work-item, which the driver is told instead of ITEMS (device.py); 0: it is told ITEMS
 //           SLOPE_TAPS, SLOPE_TERMS  of the slopes of the weights, by which rest_ij moves each pixel's position; 0: none
 // reference: sarcl/reference/backproject.py:backproject
 
@@ -32,6 +34,15 @@
 #define ACROSS (SIDE / PIXELS)    // work-items that share a line
 #define AT_ONCE (ITEMS / ACROSS)  // lines that the work-group adds to at a time
 #define LINES (SIDE / AT_ONCE)    // lines that a work-item adds to, every AT_ONCE-th
+// 1: samples of a profile are loaded before the sums, which pass while memory answers. Sums of slopes leave no registers for
+// that: on an H100 it gains 7 % without them, and loses 5 % with them against half as many registers.
+#define AHEAD (SLOPE_TAPS == 0)
+#if REGISTERS
+#define GROUP_SIZE work_group_size_hint(ITEMS, 1, 1)
+#else
+#define GROUP_SIZE reqd_work_group_size(ITEMS, 1, 1)
+#endif
+#define WEIGHING (ITEMS < SIDE ? ITEMS : SIDE)  // the last work-items, which make the weights of lines
 
 #include "pulse_lines.clh"
 
@@ -156,27 +167,29 @@ INLINED void turn(sums *s, __global const float *restrict from, __global const f
 
 // stride and origin are no neighbours: loaded as a pair, they cost four instructions per pulse on sm_90.
 typedef struct {
-    int stride, n, origin, n_used, first, n_tiles;
+    int stride, n, origin, n_used, first, n_tiles, groups;
     float step_x, step_y;
     ulong pixels;
 } backproject_shared_lines_numbers;
 
-// global size (ITEMS, tiles of this block), local size (ITEMS, 1). Arguments as of `backproject`; constants as in
+// global size (ITEMS, tiles of this block, parts), local size (ITEMS, 1, 1). Each part adds `groups` groups of pulses to sums
+// of its own, of image (parts, 4, pixels). Arguments as of `backproject`; constants as in
 // tile_constants.cl:line_constants, schedule from schedule_pulses.cl; step_x, step_y: m per pixel along j and i;
 // weights, slopes: of LINE_TAPS and SLOPE_TAPS taps; skipped (n_tiles), BEAM: (2, n_tiles)
-__kernel __attribute__((reqd_work_group_size(ITEMS, 1, 1))) void
-backproject_shared_lines(backproject_shared_lines_numbers given, tap_table table, line_table weights, slope_table slopes,
-                         __global const float *restrict profiles, __global const float *restrict constants,
-                         __global const int *restrict schedule, __global float *restrict image,
-                         __global int *restrict skipped) {
+__kernel __attribute__((GROUP_SIZE)) void backproject_shared_lines(backproject_shared_lines_numbers given, tap_table table, line_table weights, slope_table slopes,
+                              __global const float *restrict profiles, __global const float *restrict constants,
+                              __global const int *restrict schedule, __global float *restrict image,
+                              __global int *restrict skipped) {
     __local pulse_lines halves[2];
+    __local float4 numbers[GROUP * N_ENTRY / 4];  // entries of a group's pulses: read once, by all items together
     int item = get_local_id(0), lane = item % ACROSS, r0 = item / ACROSS, tile = given.first + get_global_id(1);
-    int groups = (given.n_used + GROUP - 1) / GROUP, chunk = 0, by_lines = 0, by_pixels = 0, made = 0, transposed = 0;
+    int all = (given.n_used + GROUP - 1) / GROUP, before = get_global_id(2) * given.groups;
+    int groups = min(given.groups, all - before), chunk = 0, by_lines = 0, by_pixels = 0, transposed = 0;
     int missed = 0, unlit = 0, stride = given.stride, origin = given.origin;
     float step_x = given.step_x, step_y = given.step_y;
     size_t pixels = given.pixels;
     __global const float *records = constants + get_global_id(1) * (size_t)given.n * N_LINE, *middle = records;
-    schedule += get_global_id(1) * (size_t)groups * N_GROUP;
+    schedule += (get_global_id(1) * (size_t)all + before) * N_GROUP;
     profiles += 2 * origin;
     sums s;
     CLEAR(s.re)
@@ -193,7 +206,7 @@ backproject_shared_lines(backproject_shared_lines_numbers given, tap_table table
         barrier(CLK_GLOBAL_MEM_FENCE);  // lines may run along the other axis than before: pixels change hands
         int turned = n_lines && by_lines && pulses.transposed != transposed;
         if (g == groups || (g - chunk) * GROUP >= CHUNK || turned) {
-            place out = {image + (size_t)tile * (SIDE * SIDE), pixels, transposed};
+            place out = {image + (get_global_id(2) * 4 * pixels + (size_t)tile * (SIDE * SIDE)), pixels, transposed};
             if (by_lines) turn(&s, middle, 0, step_x, step_y, r0, lane, out);
             // pulses pixel by pixel: rows and columns of the image, each item at the pixels of its sums
             for (int k = 0; by_pixels && k < LINES * PIXELS; k++) {
@@ -228,22 +241,37 @@ backproject_shared_lines(backproject_shared_lines_numbers given, tap_table table
             missed += head[H_OUTSIDE] & 65535;
             unlit += head[H_OUTSIDE] >> 16;
         }
-        for (int f = 0; f < n_lines; f++) {
-            __global const float *entry = (__global const float *)entries + N_ENTRY * f;
-            __local pulse_lines *pulse = &halves[made++ & 1];
-            __global const float *row = profiles + 2 * (size_t)as_int(entry[E_PULSE]) * stride;
-            int count = as_int(entry[E_COUNT]);
-            // few samples are more than there are items: the first items make those, the last ones the weights
+        for (int k = item; k < n_lines * (N_ENTRY / 4); k += ITEMS) numbers[k] = ((__global const float4 *)entries)[k];
+        barrier(CLK_LOCAL_MEM_FENCE);
+        // T and the weights of a pulse are made after the sums of the pulse before it, in the half that nobody reads
+        for (int f = n_lines ? -1 : 0; f < n_lines; f++) {
+            __local const float *entry = (__local const float *)numbers + N_ENTRY * (f + 1);
+            int count = f + 1 < n_lines ? as_int(entry[E_COUNT]) : 0;
+            __local pulse_lines *pulse = &halves[(f + 1) & 1];
+            __global const float *row = profiles;
+            profile_samples samples;
+            if (item < count) {
+                row += 2 * (size_t)as_int(entry[E_PULSE]) * stride;
+                if (AHEAD) read_profile(pulses, entry, item, row, stride, origin, &samples);
+            }
+            if (f >= 0) sum_lines(&s, r0, lane, &halves[f & 1]);
+            if (item < count) {
+                if (!AHEAD) read_profile(pulses, entry, item, row, stride, origin, &samples);
+                write_sample(&samples, entry, item, table.of, pulse->T);
+            }
 #pragma unroll 1
-            for (int k = item; k < count; k += ITEMS) take_sample(pulses, entry, k, row, stride, origin, table.of, pulse->T);
-            if (item >= ITEMS - SIDE) weigh_line(pulses, entry, item - (ITEMS - SIDE), weights.of, slopes.of, pulse);
-            // the other half may still be read: it is not written before the next barrier
+            for (int k = item + ITEMS; k < count; k += ITEMS) {
+                read_profile(pulses, entry, k, row, stride, origin, &samples);
+                write_sample(&samples, entry, k, table.of, pulse->T);
+            }
+            if (item >= ITEMS - WEIGHING && count)
+                for (int r = item - (ITEMS - WEIGHING); r < SIDE; r += WEIGHING)
+                    weigh_line(pulses, entry, r, weights.of, slopes.of, pulse);
             barrier(CLK_LOCAL_MEM_FENCE);
-            sum_lines(&s, r0, lane, pulse);
         }
     }
     if (item == 0) {
-        skipped[tile] += missed;
-        if (BEAM) skipped[given.n_tiles + tile] += unlit;
+        atomic_add(skipped + tile, missed);
+        if (BEAM) atomic_add(skipped + given.n_tiles + tile, unlit);
     }
 }

@@ -32,15 +32,14 @@ LINE_WEIGHTS = 1.0  # per line and pulse: weights of its taps
 LINE_PULSE = 30.0  # per tile and pulse
 LINE_GROUP = 0.4  # per pixel and group of pulses
 
-# Lines that a work-group shares (kernels/backproject_shared_lines.cl), in instructions of one lane on sm_90, counted on
-# 2026-11-23 (make gpu-static) with polynomials for sine and cosine.
-SHARED_TAP = 4.0  # per contribution and tap, of the weights and of their slopes
-SHARED_READ = 1.0  # per number of local memory that a work-item reads
-SHARED_PULSE = 50.0  # per work-item and pulse, of 16 contributions
-SHARED_SAMPLE, SHARED_SAMPLE_TAP = 45.0, 12.0  # per sample of a line's profile, and per tap of its interpolation
-SHARED_LINE, SHARED_LINE_TAP = 96.0, 17.0  # per line and pulse, and per tap of its weights
+# Lines that a work-group shares (kernels/backproject_shared_lines.cl), in instructions of one lane that pass in the
+# same time in kernels/backproject.cl. Measured on an NVIDIA H100 on 2026-11-27 with 8192 x 8192 pixels, 1024 pulses and
+# 12 combinations of taps, fine samples and sides of tiles, which the sum gives within a tenth.
+SHARED_TAP, SHARED_SLOPE_TAP = 1.75, 3.6  # per contribution and tap, of the weights and of their slopes
+SHARED_READ = 2.2  # per number of local memory that a work-item reads
+SHARED_SAMPLE, SHARED_SAMPLE_TAP = 68.0, 5.5  # per fine sample of a line, and per tap of its interpolation
 SHARED_TURN = 84.0  # per contribution over the pulses of a group
-SHARED_TILE = 1700.0  # per tile and pulse: its record and what is done with it
+SHARED_TILE = 13900.0  # per tile and pulse: its record and what is done with it
 SHARING_PAYS = 1e7  # pairs of row and pixel below which building these kernels takes longer than they save
 GATHERED = 48.2  # instructions per contribution of kernels/backproject.cl with two taps: the unit of the costs of plans
 
@@ -183,12 +182,14 @@ class DeviceClass(NamedTuple):
     local_memory  bytes of local memory that the work-items of a group share; 0: they share nothing
     gathering     costs of kernels/backproject.cl
     native_error  error of the devices' own sine and cosine, rad; infinite: they are not used
+    most_items    work-items of a group, at most
     """
 
     lanes: bool
     local_memory: int = 0
     gathering: Gathering = ON_CPU
     native_error: float = np.inf
+    most_items: int = 256
 
     @classmethod
     def of(cls, infos: Iterable[Any], native_error: float = np.inf) -> DeviceClass:
@@ -197,9 +198,8 @@ class DeviceClass(NamedTuple):
         if any(info.vector_width > 1 for info in infos):
             return cls(all(info.vector_width > 1 for info in infos))
         shared = min(min(info.local_memory, MOST_LOCAL) for info in infos)
-        groups_fit = all(info.max_group >= MOST_ITEMS for info in infos)
         gathering = ON_GPU if all(info.fp64 and info.fast_fp64 for info in infos) else ON_GPU_IN_PAIRS
-        return cls(False, shared if groups_fit else 0, gathering, native_error)
+        return cls(False, shared, gathering, native_error, min(info.max_group for info in infos))
 
     def native_pays(self, tolerance: float) -> bool:
         """Whether the error of the devices' own sine and cosine is small beside a tolerance."""
@@ -207,26 +207,21 @@ class DeviceClass(NamedTuple):
 
 
 NATIVE_SHARE = 0.03  # largest share of a tolerance for the error of one sine and cosine of the device's own
-MOST_ITEMS = 256  # work-items of the largest group of kernels/backproject_shared_lines.cl
 MOST_LOCAL = 48 * 1024  # bytes of local memory that each NVIDIA device gives to a work-group
 CPU = DeviceClass(lanes=True)
 
 
-def shared_lines(
-    side: int, fine: int, taps: int, slope_taps: int, group: int, profile_taps: int, samples: float
-) -> float:
+def shared_lines(side: int, fine: int, taps: int, slope_taps: int, group: int, profile_taps: int) -> float:
     """Cost per contribution of lines that a work-group shares.
 
-    side      pixels along a side of a tile;  fine  samples of a line's profile per pixel;  samples  of that profile
+    side      pixels along a side of a tile;  fine  samples of a line's profile per pixel
     taps, slope_taps, profile_taps   of the weights of lines, of their slopes, and from the range profile to the line's
     group     pulses that share a curvature
     """
     reads = (3 * fine + taps) / 4 if fine < taps else taps  # by an item with four neighbouring pixels, per pixel
-    reads += (taps + slope_taps) / 8 + 1 / 4
-    pair = SHARED_TAP * (taps + slope_taps) + SHARED_READ * reads + SHARED_PULSE / 16
-    tile = samples * (SHARED_SAMPLE + SHARED_SAMPLE_TAP * profile_taps) + side * (SHARED_LINE + SHARED_LINE_TAP * taps)
-    tile += SHARED_TILE
-    return (pair + tile / side**2 + SHARED_TURN / group) / GATHERED
+    pair = SHARED_TAP * taps + SHARED_SLOPE_TAP * slope_taps + SHARED_READ * reads
+    samples = fine * (SHARED_SAMPLE + SHARED_SAMPLE_TAP * profile_taps) / side
+    return (pair + samples + SHARED_TILE / side**2 + SHARED_TURN / group) / GATHERED
 
 
 @functools.lru_cache(maxsize=4096)

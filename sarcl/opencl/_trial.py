@@ -218,15 +218,17 @@ def compared(result: Result, rows: np.ndarray, right: np.ndarray) -> str:
 def _local_memory(queue: pyopencl.CommandQueue, kernel: Any, offered: int, max_group: int) -> tuple[int, str]:
     """Bytes of local memory that the kernel `exchange` runs with, and what it gets wrong with them, or nothing.
 
-    A driver may refuse what it offers: half as much is tried then, down to LOCAL_LEAST.
+    A driver may refuse what it offers. Many keep a few bytes of it for themselves (NVIDIA 16): a little less is tried
+    first, then half as much, down to LOCAL_LEAST.
     """
     import pyopencl
 
     info = pyopencl.kernel_work_group_info.WORK_GROUP_SIZE
     group = min(GROUP, max_group, kernel.get_work_group_info(info, queue.device))
-    local = min(offered, LOCAL_MOST) // (4 * group) * 4 * group
+    row = 4 * group
+    local = most = min(offered, LOCAL_MOST) // row * row
     while local >= LOCAL_LEAST:
-        each = local // (4 * group)
+        each = local // row
         numbers = np.zeros((each, GROUPS, group), np.int32)
         try:
             out = pyopencl.Buffer(queue.context, pyopencl.mem_flags.READ_WRITE, numbers.nbytes)
@@ -234,7 +236,7 @@ def _local_memory(queue: pyopencl.CommandQueue, kernel: Any, offered: int, max_g
             kernel(queue, (GROUPS * group,), (group,), np.int32(each), shared, out)
             pyopencl.enqueue_copy(queue, numbers, out)
         except pyopencl.Error:
-            local = local // 2 // (4 * group) * 4 * group
+            local = most - row if local == most else local // 2 // row * row
             continue
         right = np.arange(numbers.size).reshape(numbers.shape)[..., ::-1]
         if np.array_equal(numbers, right):

@@ -86,6 +86,12 @@ class Device:
         """True for CPU devices, whose buffers share the host's memory."""
         return self.info.kind == "cpu"
 
+    @property
+    def bounds_registers(self) -> bool:
+        """Whether the macro REGISTERS of a kernel bounds the registers of a work-item: NVIDIA's driver does so, where a
+        kernel does not require the size of its groups."""
+        return self.info.platform.startswith("NVIDIA")
+
     def without_fp64(self) -> Device:
         """The same device, its kernels built without float64."""
         return _twin(self, fp64=False, fast_fp64=False)
@@ -108,6 +114,8 @@ class Device:
         text = source(file)
         # a macro that the code does not name would only make the driver's cache hold the same binary twice
         options = [f"-D{k}={int(v)}" for k, v in sorted(macros.items()) if k in names_in(text)]
+        if macros.get("REGISTERS"):
+            options.append(f"-cl-nv-maxrregcount={macros['REGISTERS']}")
         try:
             with quiet():
                 program = build(self.context, text, options)

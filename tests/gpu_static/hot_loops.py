@@ -21,13 +21,15 @@ class Hot:
                    "kernel": all of it, each instruction once
     trips          trips of each loop inside the hot one, in order of addresses, loops inside these right after each:
                    expressions
-    sides          shares of the trips in which a work-item's warp takes each side of a branch that is SIDE instructions
-                   long or more, the shortest first, inner loops' after those of the loops around them: expressions.
-                   For branches that whole warps take alike; where lanes of a warp may differ there is no entry, and
-                   both sides count, as they do where the machine code has other branches than these
+    sides          shares of the trips in which a work-item's warp takes each side of a branch that has `shortest`
+                   instructions or more, the shortest first, inner loops' after those of the loops around them:
+                   expressions. For branches that whole warps take alike; where lanes of a warp may differ there is no
+                   entry, and both sides count, as they do where the machine code has other branches than these
     around         trips of the hot loop per trip of the loop around it, whose share is then counted too: an expression
     trips_around   as `trips`, of the loops inside that loop, but for the hot one
     unrolled       contributions of a work-item where the compiler unrolls the hot loop and no other is left
+    shortest       instructions of the shortest side of a branch that may count for a share
+    merged         how many of the first `sides` the machine code does not have: an expression
     """
 
     contributions: str
@@ -38,9 +40,12 @@ class Hot:
     around: str = ""
     trips_around: tuple[str, ...] = ()
     unrolled: str = ""
+    shortest: int = 64
+    merged: str = "0"
 
 
-SIDE = 64  # instructions of the shortest side of a branch that may count for a share
+# share of the items of a group that make samples of T
+T_ITEMS = "min(-(-(FINE * SIDE + LINE_TAPS + 10) // 32) * 32 / ITEMS, 1)"
 
 
 # By file and kernel. For kernels that are not listed the figure is the instructions of one trip of their largest
@@ -50,14 +55,17 @@ HOT = {
     ("backproject.cl", "backproject"): Hot("VECTORS * VW", "pulse and pixel", sides=("1", "0")),
     ("backproject_float64.cl", "backproject"): Hot("VW", "pulse and pixel"),
     ("backproject_lines.cl", "backproject_lines"): Hot("VW", "pulse and pixel"),
-    # The loop inside makes samples of T: those that all lines read, and up to ten more where lines lie across the
-    # range. The last SIDE items make the weights of a line each. Whole warps do both.
+    # The first items read and write samples of T: those that all lines read, and up to ten more where lines lie across
+    # the range. The loop inside makes those that are more than there are items. The last SIDE items make the weights of
+    # a line each. Whole warps do all this; all add to their sums.
     ("backproject_shared_lines.cl", "backproject_shared_lines"): Hot(
         "SIDE * SIDE / ITEMS",
         "pulse and pixel",
         loop="barrier",
-        trips=("-(-(FINE * SIDE + LINE_TAPS + 10) // 32) * 32 / ITEMS",),
-        sides=("SIDE / ITEMS",),
+        trips=("max(-(-(FINE * SIDE + LINE_TAPS + 10) // 32) * 32 - ITEMS, 0) / ITEMS",),
+        sides=(T_ITEMS, T_ITEMS, "min(SIDE / ITEMS, 1)", "1"),
+        shortest=32,
+        merged="int(SLOPE_TAPS > 0)",  # which are read where they are written
         # Per group of pulses: sums are turned by its curvature, line by line; they join the image where that ends a
         # chunk, else those of the next group. Pulses pixel by pixel (two loops in a third) are none of these pairs.
         around="GROUP",
@@ -67,6 +75,7 @@ HOT = {
             "0",
             "0",
             "SIDE * SIDE / ITEMS / 4 * (GROUP < CHUNK)",
+            "GROUP * 6 / ITEMS",  # what is known of the pulses, 24 numbers each
         ),
     ),
     ("schedule_pulses.cl", "schedule_pulses"): Hot("1", "pulse and tile", loop="kernel", trips=("1", "1", "1")),
@@ -160,10 +169,11 @@ def cost(code: Code, hot: Hot | None, macros: dict[str, int]) -> Cost:
         own = code.own(loop)
         return Cost(len(own), 1.0, "trip", {k: float(v) for k, v in kinds(own).items()}, len(own))
     count = Counter()
-    sides = [side for here in (loop, *inside(loop)) for side in code.sides(here, SIDE)] if hot.sides else []
+    sides = [side for here in (loop, *inside(loop)) for side in code.sides(here, hot.shortest)] if hot.sides else []
     shares = {}
-    if len(sides) == len(hot.sides):
-        shares = {(side.first, side.last): share for side, share in zip(sides, hot.sides, strict=True)}
+    expected = hot.sides[int(evaluated(hot.merged, macros)) :] if hot.sides else ()
+    if len(sides) == len(expected):
+        shares = {(side.first, side.last): share for side, share in zip(sides, expected, strict=True)}
     count.add(code, loop, 1.0, hot.trips, shares, macros)
     if hot.around:
         outer = min((o for o in code.every_loop() if o.holds(loop)), key=lambda o: o.last - o.first, default=None)
@@ -203,7 +213,7 @@ class Counter:
                 all_trips[id(child)] = all_trips[id(here)] * evaluated(given[id(child)], macros)
                 todo.append(child)
             skipped = [*here.inside, *([but] if but and here is loop else [])]
-            sides = [side for side in code.sides(here, SIDE) if (side.first, side.last) in shares]
+            sides = [side for side in code.sides(here, 1) if (side.first, side.last) in shares]
             for n in range(here.first, here.last + 1):
                 if any(part.first <= n <= part.last for part in skipped):
                     continue

@@ -13,9 +13,18 @@ from gpu_static.ratchet import NOT_ON_GPUS
 PAGE = ROOT / "docs" / "developers" / "gpu_static.md"
 VARIANTS = ROOT / "tests" / "gpu_static" / "variants.md"  # a table per kernel, too long for a page of the docs
 BEGIN, END = "<!-- tables: begin, made by `make gpu-static ARGS=--record` -->", "<!-- tables: end -->"
-SHOWN = "TAPS", "LINE_TAPS", "SLOPE_TAPS", "FINE", "RANGE", "FP64"  # macros by which the first table names programs
-# H200, inferred: 132 multiprocessors that issue to 4 x 32 lanes at 1.86 GHz, and pass wavefronts at 1.75 GHz.
-LANE_INSTRUCTIONS, WAVEFRONTS = 31.4e12, 132 * 1.75e9
+SHOWN = (
+    "TAPS",
+    "LINE_TAPS",
+    "SLOPE_TAPS",
+    "FINE",
+    "RANGE",
+    "FP64",
+    "NATIVE",
+)  # macros by which the first table names programs
+# H200, inferred: 132 multiprocessors that issue to 4 x 32 lanes, and pass a wavefront, in each cycle at 1.75 GHz.
+WAVEFRONTS = 132 * 1.75e9
+LANE_INSTRUCTIONS = 4 * 32 * WAVEFRONTS
 # Programs of the gather kernel for the same pulses and pixels, which take what lines cannot hold: the macros by which
 # they are found, and samples of a range profile per pulse as plans would choose them.
 GATHER = {

@@ -17,6 +17,7 @@ from sarcl.imaging.focusing_task import make_task
 from sarcl.numerics import cost_model, error_bounds, interpolation
 from sarcl.numerics.cost_model import DeviceClass
 from sarcl.opencl import native_functions
+from sarcl.opencl.device import Device
 
 SLOW = pytest.mark.slow
 WIDE = DeviceClass(lanes=False, local_memory=cost_model.MOST_LOCAL, gathering=cost_model.ON_GPU)
@@ -133,6 +134,52 @@ def pixel_by_pixel(monkeypatch):
 
     monkeypatch.setattr(tile_kernels.SharedLineKernel, "add", counted)
     return counts
+
+
+@pytest.mark.parametrize("most", [64, pytest.param(16, marks=SLOW)])
+def test_groups_are_as_small_as_the_driver_wants_them_for_this_kernel(wide, monkeypatch, most):
+    task, plan, tiling = planned(spaceborne(), PLANE, 1e-3)
+    expected, _ = focused(wide, task, plan, tiling)
+    monkeypatch.setattr(Device, "max_group", lambda self, kernel: most)
+    sizes = launches(monkeypatch)
+    image, _ = focused(wide, task, plan, tiling)
+    assert {group for _, group in sizes} == {(most, 1, 1)} and plan.items > most
+    assert np.linalg.norm(image.data - expected.data) <= 1e-6 * np.linalg.norm(expected.data)
+
+
+def test_devices_of_small_groups_take_small_tiles():
+    task = make_task(spaceborne(), PLANE, None, None, False, True)
+    plan = _shared_line_plan.choose(task, 1e-3, WIDE._replace(most_items=64))
+    assert plan is not None and plan.side == 32 and plan.items == 64
+    assert _shared_line_plan.choose(task, 1e-3, WIDE._replace(most_items=63)) is None
+
+
+def test_few_tiles_share_the_pulses_among_work_groups_that_occupy_a_device(wide, monkeypatch):
+    raw = spaceborne(n_rows=150)
+    task, plan, tiling = planned(raw, PLANE, 1e-3)
+    plan = replace(plan, group=16)
+    alone, skipped = focused(wide, task, plan, tiling)
+    many = Device(replace(wide.info, units=132), wide._raw)
+    sizes = launches(monkeypatch)
+    images = [focused(many, task, plan, tiling) for _ in range(2)]
+    # blocks of 128 rows: a part of the sums for each group of 16, in each of four tiles
+    assert [size[1:] for size, _ in sizes] == 2 * [(4, 8), (4, 2)]
+    assert np.array_equal(images[0][0].data, images[1][0].data) and images[0][1] == skipped
+    assert image_error(images[0][0], raw, most=600) <= plan.predicted_error
+    assert np.linalg.norm(images[0][0].data - alone.data) <= 1e-6 * np.linalg.norm(alone.data)
+
+
+def launches(monkeypatch):
+    """A list that gets the global size, and the size of groups, of each launch of the kernel by lines."""
+    made, run = [], Device.run
+
+    def kept(device, kernel, size, group, *args, **options):
+        if kernel.function_name == "backproject_shared_lines":
+            made.append((size, group))
+        run(device, kernel, size, group, *args, **options)
+
+    monkeypatch.setattr(Device, "run", kept)
+    return made
 
 
 FALLBACKS = {

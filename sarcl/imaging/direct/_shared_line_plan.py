@@ -19,6 +19,7 @@ SLOPE_TAPS = (0, 2, 4, 6, 8)  # taps of the slopes of weights; 0: positions are 
 SAMPLED_SIDES = 1.4  # sides of a tile that the samples of a line reach over, without those of its taps
 CHUNK = 64  # pulses added in float32 before the compensated total
 PER_ITEM = 16  # pixels of a work-item
+ENTRY = 24  # numbers that are known of a pulse: N_ENTRY of kernels/line_schedule.clh
 PIXELS = 4  # neighbouring ones among them: PIXELS of the kernel
 MOST_LOCAL = 48 * 1024  # bytes of local memory that any NVIDIA device gives to a work-group
 
@@ -39,6 +40,11 @@ class SharedLinePlan(LinePlan):
         """Work-items of a group."""
         return self.side**2 // PER_ITEM
 
+    @property
+    def least_items(self) -> int:
+        """Fewest work-items with which the kernel works: those that share a line."""
+        return self.side // PIXELS
+
     def macros(self, bistatic: bool, wrap: bool, local: bool = False) -> dict[str, int]:
         """Build-time macros of kernels/backproject_shared_lines.cl."""
         if local:
@@ -53,23 +59,28 @@ class SharedLinePlan(LinePlan):
     @property
     def local_bytes(self) -> int:
         """Bytes of local memory of a work-group."""
-        return local_bytes(self.side, self.fine, self.line.taps, self.slopes.taps if self.slopes else 0)
+        return local_bytes(self.side, self.group, self.fine, self.line.taps, self.slopes.taps if self.slopes else 0)
 
 
-def local_bytes(side: int, fine: int, taps: int, slope_taps: int) -> int:
-    """Bytes of local memory that a work-group takes: two pulses' samples of T, weights, slopes and places of lines."""
+def local_bytes(side: int, group: int, fine: int, taps: int, slope_taps: int) -> int:
+    """Bytes of local memory that a work-group takes: two pulses' samples of T, weights, slopes and places of lines, and
+    what is known of the pulses of a group."""
     period = fine * PIXELS
     rows = period + (PIXELS - 1) * fine + taps - 1
     columns = fine * (2 * side + 16) // period + 1
-    return 2 * (8 * rows * columns + 8 * side * taps + max(8 * side * slope_taps, 16) + 4 * side)
+    pulses = 2 * (8 * rows * columns + 8 * side * taps + max(8 * side * slope_taps, 16) + 4 * side)
+    return pulses + 4 * ENTRY * group
 
 
 def choose(task: FocusingTask, tolerance: float, devices: DeviceClass) -> SharedLinePlan | None:
     """The cheapest SharedLinePlan whose predicted error is at most `tolerance`, or None.
 
-    devices  those that follow the plan: their local memory holds two pulses
+    devices  those that follow the plan: their local memory holds two pulses, their groups the items of a tile
     """
-    tiles = list(itertools.product(SIDES, GROUP_SIZES))
+    sides = [side for side in SIDES if side**2 // PER_ITEM <= devices.most_items]
+    if not sides:
+        return None
+    tiles = list(itertools.product(sides, GROUP_SIZES))
     plans = (
         plan
         for curvature in curvatures(task, task.antennas, tiles, is_bent=True)
@@ -98,7 +109,7 @@ def _plans(
     for fine, taps, slope_taps in itertools.product(FINES, interpolation.LINE_TERMS, SLOPE_TAPS):
         if cells * SAMPLING_MARGIN >= fine or slope_taps > taps:
             continue
-        if local_bytes(side, fine, taps, slope_taps) > devices.local_memory:
+        if local_bytes(side, group, fine, taps, slope_taps) > devices.local_memory:
             continue
         line = interpolation.line_interpolator(taps, fine / cells)
         slopes = interpolation.line_interpolator(slope_taps, fine / cells) if slope_taps else None
@@ -111,7 +122,7 @@ def _plans(
         if choice is None:
             continue
         interpolator, length, _ = choice
-        cost = cost_model.shared_lines(side, fine, taps, slope_taps, group, interpolator.taps, line_samples)
+        cost = cost_model.shared_lines(side, fine, taps, slope_taps, group, interpolator.taps)
         yield SharedLinePlan(
             side=side,
             fine=fine,

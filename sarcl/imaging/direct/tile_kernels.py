@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -23,11 +24,12 @@ from ..tiling.plane import LineTiling
 from ..tiling.tiling import Tiling
 from . import _shared_line_plan, line_plan
 from ._line_curvature import steps
-from ._shared_line_plan import SharedLinePlan
+from ._shared_line_plan import ENTRY, SharedLinePlan
 from .line_plan import LinePlan
 
 CHUNK = 64  # rows added in float32 before the compensated total; blocks of rows are multiples of it
-ENTRY = 24  # numbers that a pulse takes in the record of its group: N_ENTRY of kernels/line_schedule.clh
+REGISTERS = 128  # of work-items that sum slopes too: two groups of 256 on a multiprocessor of NVIDIA
+AT_ONCE = 2  # work-groups of lines that a multiprocessor works on at a time
 VECTORS = 4  # vectors of pixels per work-item of the per-pixel kernel
 
 
@@ -188,23 +190,48 @@ class SharedLineKernel(_Lines):
         self.plan, self.least_rows, self.n_line = plan, plan.group, line_plan.components(form.beam) + 8
         self.components = self.n_line + ENTRY + 1  # and a pulse's share of its group's record
         self.schedule = device.kernel("schedule_pulses.cl", "schedule_pulses", **self.macros)
-        self.kernel = device.kernel("backproject_shared_lines.cl", "backproject_shared_lines", **self.macros)
+        bound = REGISTERS if plan.slopes and device.bounds_registers else 0
+        macros = self.macros | {"REGISTERS": bound}
+        self._built = partial(device.kernel, "backproject_shared_lines.cl", "backproject_shared_lines", **macros)
+        self.items = self._items()
+        self.kernel = self._built(ITEMS=self.items)
+        self.add_parts = device.kernel("assemble_image.cl", "add_parts")
         interpolators = (plan.interpolator, plan.line, plan.slopes or plan.line)
         self.tables = [np.ravel(one.table) for one in interpolators]  # structs of the kernel's arguments
 
+    def _items(self) -> int:
+        """Work-items of a group: those of the plan, halved until the driver allows them for this kernel. The sums of
+        pixels stay the same."""
+        items = self.plan.items
+        while items > self.plan.least_items and self.device.max_group(self._built(ITEMS=items)) < items:
+            items //= 2
+        return items
+
     def add(self, on: TilesOnDevice, low: int, high: int, block: Block, image: Buffer) -> None:
         """Add a block of pulses to tiles low ... high - 1 of `image` (4, pixels)."""
-        device, pulses, items = self.device, block.pulses, self.plan.items
+        device, pulses, items = self.device, block.pulses, self.items
         groups = -(-pulses.n_used // self.plan.group)
         constants = self.constants(on, low, high, pulses, self.n_line)
         schedule = device.empty(4 * (4 + ENTRY * self.plan.group) * groups * (high - low))
         numbers = {"n": pulses.n, "n_used": pulses.n_used, **self.steps, **self.limits}
         launch = launch_numbers("schedule_pulses.cl", "schedule_pulses", **numbers)
         device.run(self.schedule, (groups, high - low), None, launch, constants, schedule)
-        numbers = on.numbers(low, block) | self.steps
+        each = self._groups_at_once(groups, on.tiles.n_tiles)
+        parts = -(-groups // each)
+        sums = image if parts == 1 else device.zeros(parts * image.size)
+        numbers = on.numbers(low, block) | self.steps | {"groups": each}
         launch = launch_numbers("backproject_shared_lines.cl", "backproject_shared_lines", **numbers)
-        buffers = *self.tables, block.profiles.buffer, constants, schedule, image, on.missed
-        device.run(self.kernel, (items, high - low), (items, 1), launch, *buffers, steps=pulses.n_used)
+        buffers = *self.tables, block.profiles.buffer, constants, schedule, sums, on.missed
+        size, group = (items, high - low, parts), (items, 1, 1)
+        device.run(self.kernel, size, group, launch, *buffers, steps=pulses.n_used / parts)
+        if parts > 1:
+            device.run(self.add_parts, (image.size // 16,), None, sums, parts, image)
+
+    def _groups_at_once(self, groups: int, tiles: int) -> int:
+        """Groups of pulses that a work-group adds up: all of them, or a part where an image has too few tiles to occupy
+        the device. The sums of parts are added one after another: images have the same bits in every run."""
+        parts = min(groups, -(-AT_ONCE * self.device.info.units // tiles))
+        return -(-groups // parts)
 
 
 class TilesOnDevice:
