@@ -17,7 +17,8 @@ import numpy as np
 
 from ..base import constants
 from ..model.image import Image
-from ._surface import Ends, Surface, ends_at, has_surface, place_of, surface_at
+from ..model.maps.antennas import Ends, ends_at
+from ._surface import Surface, has_surface, place_of, surface_at
 
 CHIP = 32  # pixels on each side of the point from whose spectrum the occupied band is determined
 LEAST = 8  # pixels on each side that a spectrum needs at least

@@ -18,9 +18,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..base import validation
 from ..model.image import Image
+from ..model.maps.antennas import ends_at
 from ._image_interpolator import ImageInterpolator
 from ._peaks import brightest, brightest_around, peak_near, place
-from ._surface import ends_at, place_of
+from ._surface import place_of
 
 if TYPE_CHECKING:
     import PIL.Image

@@ -97,6 +97,7 @@ def simulate(args: argparse.Namespace, job: Job) -> int:
             print(f"image: {scenario.describe_image()}")
         return 0
     _check_room(grid, images)
+    _check_maps(grid, images, args)
     if scenario.noise is None:  # pulse after pulse into the file
         raw = scenario.simulate(**options, **on, **running, out=output, progress=job.progress)
         job.check()
@@ -116,6 +117,7 @@ def simulate(args: argparse.Namespace, job: Job) -> int:
         if grid is None and scenario.needs_grid:
             grid = _default_grid(raw, job, scenario.default_grid_options())
         _check_room(grid, images)
+        _check_maps(grid, images, args)
         options |= {"device": devices if scenario.focuses_in_blocks else devices[0]}
         _focus(lambda out: scenario.focus(raw, grid, out=out, progress=job.progress, **options), images, args, job)
     return 0
@@ -165,6 +167,7 @@ def focus(args: argparse.Namespace, job: Job) -> int:
         return 0
     running = {} if method.name != "backproject" else {"tile": args.tile, "resume": args.resume}
     _check_room(grid, outputs)
+    _check_maps(grid, outputs, args)
     if any(formats.named(path, [formats.SICD]) for path in outputs):
         _check_product(raw, grid, method)
 
@@ -226,6 +229,18 @@ def _check_room(grid: ImageGrid | None, outputs: list[str]) -> None:
         pictures, shape = formats.writing("picture"), (grid.shape[0], grid.shape[1])
         drawn, stored = picture_bytes(shape, grid.spacing), 8.0 * grid.size
         output_paths.check_room({p: drawn if formats.named(p, pictures) else stored for p in outputs})
+
+
+def _check_maps(grid: ImageGrid | None, outputs: list[str], args: argparse.Namespace) -> None:
+    """Refuse, before the work, maps of an image in a local frame, and a CRS that is not known."""
+    if any(formats.named(path, formats.writing("map")) for path in outputs):
+        from ..earth.map_projection import MapProjection
+        from ..model.maps.saving import check_place
+
+        if args.map_crs is not None:
+            MapProjection.of(args.map_crs)
+        if grid is not None:
+            check_place(grid)
 
 
 def _check_scale(args: argparse.Namespace) -> None:
@@ -295,6 +310,8 @@ def _focus(
             scale = f". {picture.info['caption']}"
         elif path != file and raw is not None and formats.named(path, [formats.SICD]):
             image.save(path, collection=raw)
+        elif formats.named(path, formats.writing("map")):
+            image.save(path, value=args.map_value, crs=args.map_crs)
         elif path != file:
             image.save(path)
         job.say(f"wrote {path}{scale}")

@@ -209,6 +209,15 @@ def _picture(p: argparse.ArgumentParser) -> None:
     _add(white, "--top-db DB", "white, dB of a unit point in focus", float)
     text = "white: this percentile of the scene's pixels (default 99.5; 100: the brightest pixel)"
     _add(white, "--percentile P", text, float)
+    maps = p.add_argument_group("maps, .tif", "GeoTIFF of images in Earth-fixed coordinates (needs the extra maps)")
+    _add(
+        maps,
+        "--map-value",
+        "of the pixels (default complex)",
+        choices=("complex", "amplitude", "db"),
+        default="complex",
+    )
+    _add(maps, "--map-crs CRS", "as EPSG:4326 (default: that of the grid, or the UTM zone)")
 
 
 def _bench(p: argparse.ArgumentParser) -> None:

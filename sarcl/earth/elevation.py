@@ -17,7 +17,7 @@ from ..base.types import PathLike
 from ..base.vectors import Floats
 from ..io import elevation
 from ..io.elevation import Geoid
-from ._grid_index import Axes, Curvilinear
+from .grid_index import Axes, Curvilinear
 
 FARTHEST = 1e6  # degrees: more is no place
 SAME = 1e-9  # distance to a point, in cells, below which a position is at it
@@ -108,17 +108,25 @@ class ElevationModel:
             lon, lat = np.broadcast_arrays(lon, lat)
         except ValueError:
             raise ValueError(f"longitude has shape {lon.shape} and latitude {lat.shape}; give equal ones") from None
-        shape, (index, height) = lon.shape, self._index
+        return self.heights_in(self.cells_at(lon.ravel(), lat.ravel())).reshape(lon.shape)
+
+    def cells_at(self, lon: Floats, lat: Floats) -> Floats:
+        """Fractional (row, column) (2, n) of degrees (n,), NaN outside the grid."""
+        index, height = self._index
         is_place = (np.abs(lon) < FARTHEST) & (np.abs(lat) < FARTHEST)
         degrees = ((lon, self.longitude[0, 0]), (lat, self.latitude[0, 0]))
-        position = index.at(*(np.where(is_place, value, corner).ravel() for value, corner in degrees))
+        position = index.at(*(np.where(is_place, value, corner) for value, corner in degrees))
         nearest = np.rint(position)
         position = np.where(
             np.abs(position - nearest) < SAME, nearest, position
         )  # a point needs no neighbours' heights
         size = np.array(height.shape)[:, None] - 1
-        is_inside = is_place.ravel() & ((position >= -1e-6) & (position <= size + 1e-6)).all(axis=0)
-        return np.where(is_inside, _bilinear(height, np.clip(position, 0, size)), np.nan).reshape(shape)
+        is_inside = is_place & ((position >= -1e-6) & (position <= size + 1e-6)).all(axis=0)
+        return np.where(is_inside, np.clip(position, 0, size), np.nan)
+
+    def heights_in(self, cells: Floats) -> Floats:
+        """Heights above the ellipsoid, m (n,), at fractional (row, column) (2, n) by `cells_at`."""
+        return _bilinear(self._index[1], cells)
 
     @functools.cached_property
     def _index(self) -> tuple[Axes | Curvilinear, Floats]:

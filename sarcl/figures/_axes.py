@@ -148,20 +148,6 @@ def wrapped(text: str, room: float, length: Callable[[str], float]) -> list[str]
     return lines
 
 
-def image_axis(
-    n: int,
-    along: int,
-    spacing: tuple[float, float] | None,
-    origin: tuple[float, float] = (0.0, 0.0),
-    names: tuple[str, str] = ("y", "x"),
-) -> Axis:
-    """The axis `along` of an image of n pixels: 0 of its rows, 1 of its columns."""
-    if spacing is None:
-        return Axis(("row", "column")[along], -0.5, n - 0.5, 1.0)
-    low = origin[along] + (-(n // 2) - 0.5) * spacing[along]
-    return Axis(f"{names[along]} (m)", low, low + n * spacing[along])
-
-
 def ticks_between(low: float, high: float, most: float, least: float = 0.0) -> tuple[float, list[float]]:
     """(step, values): multiples of 1, 2 or 5 10^k in [low, high], about `most` of them."""
     rough = max((high - low) / most, least)
@@ -173,7 +159,7 @@ def ticks_between(low: float, high: float, most: float, least: float = 0.0) -> t
 
 def number(value: float, step: float) -> str:
     """A tick's number with the decimals its step needs."""
-    if max(abs(value), step) >= 1e6 or step < 1e-4:
+    if max(abs(value), step) >= 1e6 or (step < 1e-4 and abs(value) < 1):
         return f"{value:.6g}"
     decimals = max(0, -int(np.floor(np.log10(step) + 1e-9)))
     return f"{round(value, decimals) + 0.0:.{decimals}f}"

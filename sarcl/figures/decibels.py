@@ -8,7 +8,7 @@ import numpy as np
 
 from ..base import validation
 from ..base.version import __version__
-from ._axes import CURVE_WIDTH, INK, Axes, CurveAxes, image_axis, number, ticks_between
+from ._axes import CURVE_WIDTH, INK, Axes, Axis, CurveAxes, number, ticks_between
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -46,13 +46,28 @@ class _Scale(NamedTuple):
 class PixelAxes(NamedTuple):
     """Axes of a picture of pixels.
 
-    spacing  (row, column), m; None: axes count pixels
-    origin   (row, column) coordinates, m, of pixel [rows//2, columns//2];  names: the names of these coordinates
+    spacing  (row, column); None: axes count pixels
+    origin   (row, column) coordinates of pixel [rows//2, columns//2];  names: the names of these coordinates
+    unit     of both, and metres: how many metres one of it is along (row, column)
     """
 
     spacing: tuple[float, float] | None = None
     origin: tuple[float, float] = (0.0, 0.0)
     names: tuple[str, str] = ("y", "x")
+    unit: str = "m"
+    metres: tuple[float, float] = (1.0, 1.0)
+
+    @property
+    def lengths(self) -> tuple[float, float] | None:
+        """Spacing (row, column), m."""
+        return self.spacing and (self.spacing[0] * self.metres[0], self.spacing[1] * self.metres[1])
+
+    def axis(self, n: int, along: int) -> Axis:
+        """The axis `along` of n pixels: 0 of the rows, 1 of the columns."""
+        if self.spacing is None:
+            return Axis(("row", "column")[along], -0.5, n - 0.5, 1.0)
+        low = self.origin[along] + (-(n // 2) - 0.5) * self.spacing[along]
+        return Axis(f"{self.names[along]} ({self.unit})", low, low + n * self.spacing[along])
 
 
 def picture(
@@ -233,9 +248,9 @@ def _means(power: np.ndarray, n: int) -> np.ndarray:
 def _grey_image(db: np.ndarray, axes: PixelAxes, scale: _Scale, title: str | None, zero: str | None) -> Picture:
     from PIL import Image
 
-    height, width = drawn_shape((db.shape[0], db.shape[1]), axes.spacing)
-    across, up = image_axis(db.shape[1], 1, *axes), image_axis(db.shape[0], 0, *axes)
-    ratio = (up.high - up.low) / (across.high - across.low)
+    height, width = drawn_shape((db.shape[0], db.shape[1]), axes.lengths)
+    across, up = axes.axis(db.shape[1], 1), axes.axis(db.shape[0], 0)
+    ratio = (up.high - up.low) * axes.metres[0] / ((across.high - across.low) * axes.metres[1])
     if ratio < THINNEST:
         up = up._replace(label=f"{up.label}, stretched")
     elif 1 / ratio < THINNEST:
@@ -295,7 +310,7 @@ def _line_plot(db: np.ndarray, axes: PixelAxes, scale: _Scale, title: str | None
     caption = "No sample has a signal." if peak == -np.inf else f"Maximum: {_decibels(peak)}."
     if zero and peak > -np.inf:
         caption += f" 0 dB: {zero}."
-    drawing = CurveAxes(image_axis(db.size, 1 - along, *axes), reference, floor_db, title, caption)
+    drawing = CurveAxes(axes.axis(db.size, 1 - along), reference, floor_db, title, caption)
     n = values.size
     relative = np.full(n, 2 * floor_db) if peak == -np.inf else values[0] - white
     drawing.curve((np.arange(n) + 0.5) / n, relative, CURVE, has_dots=n <= MOST_DOTS)

@@ -4,6 +4,7 @@ For other folders:
 
     elevation      elevation models through rasterio: positions on WGS84
     cphd/          CPHD files
+    geotiff        images as GeoTIFF through rasterio, with overviews
     formats        table of the file formats of phase histories and images: names, first bytes, reader, writers
     hdf5           plain values, arrays and reports in HDF5
     input_paths    input files: regular files that can be read, named where they are not

@@ -116,7 +116,7 @@ def _open_raster(path: Path, name: str, external: bool) -> Iterator[DatasetReade
         from rasterio._err import CPLE_BaseError  # errors of GDAL that have no class in rasterio.errors
         from rasterio.errors import NotGeoreferencedWarning, RasterioError
     except ImportError as exc:
-        raise ImportError("elevation models need the package rasterio: pip install sarcl[dem]") from exc
+        raise ImportError("elevation models need the package rasterio: pip install sarcl[maps]") from exc
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", NotGeoreferencedWarning)  # the code below raises an error for it
         try:

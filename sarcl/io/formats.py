@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from ..base.types import PathLike
 
 Kind = Literal["phase history", "image"]
-Written = Literal["phase history", "image", "picture", "dataset", "product"]
-OF_IMAGES: tuple[Written, ...] = ("picture", "image", "dataset")  # what is written of an image
+Written = Literal["phase history", "image", "picture", "dataset", "product", "map"]
+OF_IMAGES: tuple[Written, ...] = ("picture", "image", "dataset", "map")  # what is written of an image
 T = TypeVar("T")
 Make = Callable[[Kind, Mapping[str, Any]], T]
 
@@ -44,7 +44,7 @@ class Format:
     file       the file of this folder that reads and writes it; none where other rooms do
     options    of `load` that this format takes; the others have no effect on it, or are applied to what was read
     writes     what can be written: of an image, "picture" is made by sarcl/figures, "dataset" by sarcl/model/_labelled,
-               "product", with the collection that it was made of, by sarcl/model/sicd
+               "product", with the collection that it was made of, by sarcl/model/sicd; a "map" by sarcl/model/maps
     by_blocks  True where an image can be written block by block, and a killed run go on
     """
 
@@ -67,6 +67,11 @@ class Format:
         return "dataset" in self.writes
 
     @property
+    def is_map(self) -> bool:
+        """True where an image is written on a map."""
+        return "map" in self.writes
+
+    @property
     def is_picture(self) -> bool:
         """True where an image's grey picture is written, not its numbers."""
         return "picture" in self.writes
@@ -85,6 +90,7 @@ CPHD = Format((".cphd",), b"CPHD/", "CPHD files", "cphd._reading", ("channel", "
 SICD = Format((".nitf", ".ntf", ".sicd"), b"NITF", "SICD files", "sicd._reading", writes=("product",))
 # recognised by their content: a folder, and HDF5 of another kind
 ZARR, NETCDF = (Format((ending,), file="labelled_files", writes=("dataset",)) for ending in (".zarr", ".nc"))
+GEOTIFF = Format((".tif", ".tiff"), file="geotiff", writes=("map",))
 FORMATS = (
     Format((".png",), writes=("picture",)),
     HDF5,
@@ -93,6 +99,7 @@ FORMATS = (
     SICD,
     ZARR,
     NETCDF,
+    GEOTIFF,
 )
 NOT_READ = {  # first bytes of files that are often met, and what to say of them
     b"MATLAB 7.3": "is a MATLAB 7.3 file (save it again with -v7)",
@@ -126,7 +133,7 @@ def is_zarr(path: Path) -> bool:
 
 def check_writable(path: PathLike, n_bytes: int = 0) -> None:
     """Raises what writing a file of this name would, as far as that can be known before."""
-    form = named(path, [ZARR, NETCDF])
+    form = named(path, [ZARR, NETCDF, GEOTIFF])
     (import_module(".output_paths", __package__) if form is None else form.functions).check_writable(path, n_bytes)
 
 

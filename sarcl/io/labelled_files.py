@@ -8,8 +8,6 @@ attribute of NetCDF holds it.
 from __future__ import annotations
 
 import os
-import tempfile
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -64,7 +62,7 @@ def write(path: PathLike, dataset: xarray.Dataset) -> None:
     target = check_writable(path, int(dataset.nbytes))
     dataset = dataset.assign_attrs({MARK: "image", "format": hdf5.FORMAT})
     if target.suffix.lower() == ".zarr":
-        _put_in_place(target, lambda new: dataset.to_zarr(new, mode="w", consolidated=False))
+        output_paths.put_in_place(target, lambda new: dataset.to_zarr(new, mode="w", consolidated=False))
         return
     data = dataset["data"]
     if np.iscomplexobj(data):
@@ -72,7 +70,7 @@ def write(path: PathLike, dataset: xarray.Dataset) -> None:
     for name in [name for name in ("report", "metadata") if len(dataset.attrs.get(name, "")) > LONGEST]:
         dataset = dataset.assign({name: ((), dataset.attrs[name])})
         del dataset.attrs[name]
-    _put_in_place(target, lambda new: dataset.to_netcdf(new, engine="h5netcdf"))
+    output_paths.put_in_place(target, lambda new: dataset.to_netcdf(new, engine="h5netcdf"))
 
 
 def load(path: Path, make: Make[T]) -> T:
@@ -123,23 +121,3 @@ def _plain(value: object) -> object:
     if isinstance(value, list):
         return np.array(value)
     return value.item() if isinstance(value, np.generic) else value
-
-
-def _put_in_place(target: Path, write_to: Callable[[Path], object]) -> None:
-    """Write a new file or folder beside `target`, and move it there when it is whole; what stood there is removed.
-
-    On any exception, Ctrl-C too, what stood there stands there again. OSError where the disk is full.
-    """
-    with tempfile.TemporaryDirectory(prefix=f".{target.name}-", dir=target.parent) as name:
-        new, old = Path(name) / "new", Path(name) / "old"
-        try:
-            write_to(new)
-            if target.is_dir():
-                target.rename(old)
-            new.rename(target)
-        except BaseException as exc:
-            if old.exists():
-                old.rename(target)
-            if isinstance(exc, OSError) and exc.errno in output_paths.FULL:
-                raise output_paths.no_room(target, exc) from None
-            raise

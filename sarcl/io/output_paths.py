@@ -6,7 +6,8 @@ import errno
 import os
 import shutil
 import stat
-from collections.abc import Iterator, Mapping
+import tempfile
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -133,3 +134,23 @@ def begin(path: PathLike, n_bytes: int = 0, alone: bool = False) -> Part:
     alone  FileExistsError while another run writes a file for `path`. Raises what `check_writable` raises.
     """
     return Part.begun(check_writable(path, n_bytes), path, alone)
+
+
+def put_in_place(target: Path, write_to: Callable[[Path], object]) -> None:
+    """Write a new file or folder beside `target`, and move it there when it is whole; what stood there is removed.
+
+    On any exception, Ctrl-C too, what stood there stands there again. OSError where the disk is full.
+    """
+    with tempfile.TemporaryDirectory(prefix=f".{target.name}-", dir=target.parent) as name:
+        new, old = Path(name) / "new", Path(name) / "old"
+        try:
+            write_to(new)
+            if target.is_dir():
+                target.rename(old)
+            new.rename(target)
+        except BaseException as exc:
+            if old.exists():
+                old.rename(target)
+            if isinstance(exc, OSError) and exc.errno in FULL:
+                raise no_room(target, exc) from None
+            raise

@@ -12,6 +12,7 @@ For other folders:
     image_grid        ImageGrid: positions of the pixels
     lazy_rows         rows of arrays in files: selected, stacked, scaled and sliced without reading them
     listed_surface    positions between the points of a listed grid, and indices of positions
+    maps/             images on maps, GeoTIFF files, layers of terrain
     orbit             Orbit: where a satellite is, Earth-fixed, and what it sees
     phase_history     PhaseHistory: echoes by row and frequency, with their geometry
     pointing          attitudes of tracks: spotlight, strip map, fixed

@@ -21,7 +21,9 @@ if TYPE_CHECKING:
     import xarray
 
     from ..base.types import LazyRows, PathLike
-    from .sicd.image_product import EarthOptions
+    from ..earth.elevation import ElevationModel
+    from ..figures.decibels import PixelAxes
+    from .maps.saving import SaveOptions
 
 FRAMES = ("local", "earth-fixed")
 
@@ -212,11 +214,13 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
         """Mean intensity |data|^2 over blocks of looks = (rows, columns) pixels; incomplete blocks are left out.
 
         A gain that varies becomes the root of the mean of its square over the same blocks.
-        Raises ValueError when the grid is neither a plane nor that of `range_doppler`, or the block is larger than the
-        image.
+        Raises ValueError when the grid is neither a plane, a map, nor that of `range_doppler`, or the block is larger
+        than the image.
         """
-        if not self.grid.is_plane and self.grid.times is None:
-            raise ValueError("multilook is for images on a plane, or by range_doppler; this grid lists its points")
+        if not self.grid.is_plane and self.grid.times is None and self.grid.map_axes is None:
+            raise ValueError(
+                "multilook is for images on a plane or a map, or by range_doppler; this grid lists its points"
+            )
         a, b = validation.pair("looks", looks)
         a, b = validation.count("looks[0]", a), validation.count("looks[1]", b)
         rows, columns = self.grid.shape[0] // a, self.grid.shape[1] // b
@@ -244,7 +248,8 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
         """The picture as a PIL.Image, grey in dB, with axes, a scale, and a caption that says what white and black are.
 
         Axes are those of a plane, in metres; of an image by `range_doppler` metres along the track from its middle, in
-        the order of time upwards, and slant range less that of its middle; of other listed points rows and columns.
+        the order of time upwards, and slant range less that of its middle; of a map its longitude and latitude or
+        metres; of other listed points rows and columns.
 
         floor_db    black, in dB below white
         top_db      white, dB, where a unit point in focus has 0 dB; None: from the data, by percentile
@@ -255,32 +260,18 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
 
         ValueError where the image has not two axes, or for levels that no picture can have.
         """
-        from ..figures.decibels import PixelAxes, picture
+        from ..figures.decibels import picture
 
         title = arguments.text("title", title)
         if len(self.grid.shape) != 2:
             raise ValueError(f"a picture needs two axes; this image has shape {tuple(self.grid.shape)}")
-        origin, names = (0.0, 0.0), ("y", "x")
-        grid, spacing = self.grid, self.grid.spacing
-        if grid.center is not None and grid.y_axis is not None and grid.x_axis is not None:
-            origin = float(grid.center @ grid.y_axis), float(grid.center @ grid.x_axis)
-            # axes parallel to the scene's show its coordinates, other axes the distance along themselves
-            along = np.eye(3)[1], np.eye(3)[0]
-            if not all(np.allclose(a, b, atol=1e-9) for a, b in zip((grid.y_axis, grid.x_axis), along, strict=True)):
-                names = ("along y_axis", "along x_axis")
-        elif grid.ranges is not None and min(grid.shape) > 1:
-            middle = grid.shape[0] // 2, grid.shape[1] // 2
-            spacing = grid.spacing_at(*middle)[0], float(grid.ranges[1] - grid.ranges[0])
-            near = float(np.round(grid.ranges[middle[1]]))  # labels of seven digits would leave room for one tick
-            origin = 0.0, float(grid.ranges[middle[1]]) - near
-            names = "along the track", f"slant range less {near:.0f} m"
         db = self.decibels()
         if not (db < np.inf).all():
             i, j = np.unravel_index(int(np.argmin(db < np.inf)), db.shape)
             raise ValueError(f"image data[{i}, {j}] is {np.asarray(self.data)[i, j]}; a picture needs finite pixels")
         return picture(
             db,
-            PixelAxes(spacing, origin, names),
+            _picture_axes(self.grid),
             floor_db,
             title,
             top_db=top_db,
@@ -299,6 +290,20 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
 
         return image_dataset(self)
 
+    def layers(self, elevation: ElevationModel) -> dict[str, NDArray[np.bool_] | NDArray[np.float64]]:
+        """ "layover", "shadow" (bool) and "incidence" (rad) of terrain at the pixels, each of grid.shape.
+
+        They are those of the terrain above or below each pixel, for the antennas that the image keeps: tx and rx at
+        mid-aperture, those of `aperture` that saw the pixel, or, of `range_doppler`, where they pass it. layover: other
+        terrain has the same range and Doppler frequency; shadow: terrain hides the transmitter or the receiver;
+        incidence: from the terrain's normal to the direction of the antenna, or between those of both antennas. Terrain
+        beyond the model hides nothing; pixels outside it are False, and NaN in incidence. Equations and steps:
+        sarcl/earth/layers.py. ValueError for an image in a local frame or without tx.
+        """
+        from .maps.saving import image_layers
+
+        return image_layers(self, elevation)
+
     def _repr_png_(self) -> bytes | None:
         return self.show()._repr_png_()
 
@@ -310,15 +315,26 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
         title: str | None = None,
         top_db: float | None = None,
         percentile: float | None = None,
-        **product: Unpack[EarthOptions],
+        **options: Unpack[SaveOptions],
     ) -> None:
-        """Write "name.png" (the picture of `show`), "name.h5", "name.zarr" or "name.nc", which lose nothing, or SICD.
+        """Write "name.png" (the picture of `show`), "name.h5", "name.zarr" or "name.nc", which lose nothing, SICD, or
+        the map "name.tif".
 
-        `sarcl.read` opens these. Zarr and NetCDF are the dataset of `to_xarray`, made in memory (sarcl[xarray]).
+        `sarcl.read` opens .h5, .zarr and .nc. Zarr and NetCDF are the dataset of `to_xarray`, made in memory
+        (sarcl[xarray]). A map is a GeoTIFF with overviews, cloud-optimised (sarcl[maps]), of an Earth-fixed image. On a
+        grid by `ImageGrid.on_map` pixels are written as they are; those of other grids are resampled block by block.
+        Values are over the gain: a unit point has modulus 1. NaN means no data.
+
+        value    "complex" (the default): band-limited interpolation about the carrier at the centre frequency;
+                 "amplitude", or "db" of it: power averaged over each pixel of the map
+        crs      coordinate reference system of the map; None: that of the grid, or the UTM zone of the image
+        spacing  of (rows, columns), in units of the CRS; None: the closer spacing of the image's rows and columns
+        layers   an ElevationModel: layover, shadow and incidence as further bands of amplitude or dB (`layers`)
 
         floor_db, top_db, percentile  of a picture, as in `show`; the PNG's text entries top_db, floor_db and
                                       Description say what white and black are;  title  above the picture
-        On any exception `path` is as it was.
+        On any exception `path` is as it was. ValueError for maps of a local frame, a CRS that does not reach the image,
+        and complex pixels wider than its resolution; ImportError where a package is missing.
 
         SICD ("name.nitf", ".ntf", ".sicd"; sarcl[formats]) holds images by `backproject` on a plane, in complex64. Rows
         and columns are turned by quarter turns, so that rows lead away from the antenna; `sarcl.read` gives the same
@@ -335,19 +351,23 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
         ValueError for what a SICD file must have and these lack, with the key of metadata= that gives it, and for
         spectra that its polynomials do not describe (docs/theory/sicd.md).
         """
+        from .maps import saving
+
         image_formats = formats.writing(*formats.OF_IMAGES, "product")
         form = formats.named(arguments.path("path", path), image_formats)
         if form is None:
             endings = formats.suggested(image_formats, "'")
             raise ValueError(f"image path {str(path)!r} {formats.ending_of(path)}; choose {endings}")
+        saving.check_options(path, options, form)
         if form is formats.SICD:
             from ..io.sicd import writing
             from .sicd.image_product import product_of
 
-            writing.save(path, product_of(self, **product), self.data)
+            writing.save(path, product_of(self, **options), self.data)  # type: ignore[misc]
             return
-        if product:
-            raise ValueError(f"{', '.join(product)}: for SICD, and {str(path)!r} does not end in .nitf, .ntf or .sicd")
+        if form.is_map:
+            saving.save_map(self, path, **options)  # type: ignore[misc]
+            return
         if form.is_picture:
             from ..figures.decibels import write_png
 
@@ -390,6 +410,11 @@ def _multilooked_grid(grid: ImageGrid, a: int, b: int) -> ImageGrid:
         center = grid.at((rows // 2) * a + (a - 1) / 2, (columns // 2) * b + (b - 1) / 2)
         spacing = grid.spacing[0] * a, grid.spacing[1] * b
         return replace(grid, shape=(rows, columns), center=center, spacing=spacing)
+    if grid.map_axes is not None and grid.listed is not None:
+        blocks = grid.listed[: rows * a, : columns * b].reshape(rows, a, columns, b, 3)
+        x, y, dx, dy = grid.map_axes
+        axes = np.array([x + (b - 1) / 2 * dx, y + (a - 1) / 2 * dy, b * dx, a * dy])
+        return replace(ImageGrid.points(blocks.mean(axis=(1, 3))), crs=grid.crs, map_axes=axes)
     assert grid.times is not None and grid.ranges is not None
     i, j = np.arange(rows) * a + (a - 1) / 2, np.arange(columns) * b + (b - 1) / 2
     times, ranges = (
@@ -402,3 +427,46 @@ def _multilooked_grid(grid: ImageGrid, a: int, b: int) -> ImageGrid:
 def image_fields(image: Image) -> dict[str, Any]:
     """All fields except data and grid, by name, as sarcl's files hold them."""
     return {name: getattr(image, name) for name in FIELDS}
+
+
+def _picture_axes(grid: ImageGrid) -> PixelAxes:
+    """Axes of a picture of pixels of two axes: see `Image.show`."""
+    from ..figures.decibels import PixelAxes
+
+    origin, names = (0.0, 0.0), ("y", "x")
+    if grid.map_axes is not None and grid.crs is not None:
+        return _map_picture_axes(grid.crs, grid.map_axes, grid.shape)
+    spacing = grid.spacing
+    if grid.center is not None and grid.y_axis is not None and grid.x_axis is not None:
+        origin = float(grid.center @ grid.y_axis), float(grid.center @ grid.x_axis)
+        # axes parallel to the scene's show its coordinates, other axes the distance along themselves
+        along = np.eye(3)[1], np.eye(3)[0]
+        if not all(np.allclose(a, b, atol=1e-9) for a, b in zip((grid.y_axis, grid.x_axis), along, strict=True)):
+            names = ("along y_axis", "along x_axis")
+    elif grid.ranges is not None and min(grid.shape) > 1:
+        middle = grid.shape[0] // 2, grid.shape[1] // 2
+        spacing = grid.spacing_at(*middle)[0], float(grid.ranges[1] - grid.ranges[0])
+        near = float(np.round(grid.ranges[middle[1]]))  # labels of seven digits would leave room for one tick
+        origin = 0.0, float(grid.ranges[middle[1]]) - near
+        names = "along the track", f"slant range less {near:.0f} m"
+    return PixelAxes(spacing, origin, names)
+
+
+def _map_picture_axes(crs: str, map_axes: NDArray[np.float64], shape: tuple[int, ...]) -> PixelAxes:
+    """Axes of a map: longitude and latitude, or metres less whole thousands. Without pyproj, pixels are counted."""
+    from ..earth.map_projection import MapProjection
+    from ..figures.decibels import PixelAxes
+
+    try:
+        projection = MapProjection.of(crs)
+    except ImportError:
+        return PixelAxes()
+    x, y, dx, dy = map_axes.tolist()
+    middle = [y + shape[0] // 2 * dy, x + shape[1] // 2 * dx]
+    origin, names = list(middle), list(projection.names)
+    if not projection.is_degrees:  # labels of seven digits would leave room for few ticks
+        near = [1000.0 * np.floor(value / 1000) for value in middle]
+        origin = [value - less for value, less in zip(middle, near, strict=True)]
+        names = [f"{name} less {less:.0f} {projection.unit}" for name, less in zip(names, near, strict=True)]
+    metres = projection.scale(middle[1], middle[0])
+    return PixelAxes((dy, dx), (origin[0], origin[1]), (names[0], names[1]), projection.unit, metres)

@@ -25,7 +25,8 @@ MOST_NUMBERED = 2**63 - 1  # largest number of pixels that int64 can count
 
 @dataclass(frozen=True, eq=False)
 class ImageGrid:
-    """Pixel positions: a plane (`ImageGrid.plane`), points of terrain (`on_terrain`) or any points (`points`).
+    """Pixel positions: a plane (`ImageGrid.plane`), points of terrain (`on_terrain`), pixels of a map (`on_map`) or any
+    points (`points`).
 
     shape    of the image
     center, spacing, x_axis, y_axis   of a plane: pixel [i, j] lies at
@@ -33,6 +34,8 @@ class ImageGrid:
     listed   positions of any points, m shape + (3,), or None; NaN in all three where a cell is empty
     times, ranges   zero-Doppler times of the rows, s, and slant ranges of the columns, m, where `range_doppler` listed
              the points; else None
+    crs, map_axes  of `on_map`: coordinate reference system, and x and y of pixel [0, 0] with the steps from column to
+             column and from row to row, in its units (4,); else None
     """
 
     shape: tuple[int, ...]
@@ -43,6 +46,8 @@ class ImageGrid:
     listed: NDArray[np.float64] | None = None
     times: NDArray[np.float64] | None = None
     ranges: NDArray[np.float64] | None = None
+    crs: str | None = None
+    map_axes: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         if (self.listed is None) == (self.spacing is None):
@@ -57,14 +62,16 @@ class ImageGrid:
                     f"listed has shape {np.shape(self.listed)}, wanted {(*self.shape, 3)}, as the grid has shape "
                     f"{self.shape}; make it with ImageGrid.points"
                 )
-        for name in ("center", "x_axis", "y_axis", "listed", "times", "ranges"):
+        arguments.text("crs", self.crs)
+        lengths: dict[str, tuple[int | str]] = {"times": ("n",), "ranges": ("n",), "map_axes": (4,)}
+        for name in ("center", "x_axis", "y_axis", "listed", "times", "ranges", "map_axes"):
             value = getattr(self, name)
             if value is None or (isinstance(value, np.ndarray) and not value.flags.writeable):
                 continue
             if name == "listed":
                 array = cells(validation.converted(name, value, np.float64))
             else:
-                array = validation.array(name, value, np.float64, ("n",) if name in ("times", "ranges") else (3,))
+                array = validation.array(name, value, np.float64, lengths.get(name, (3,)))
             object.__setattr__(self, name, array)
         if self.spacing is not None:
             object.__setattr__(self, "spacing", steps(self.spacing))
@@ -177,6 +184,30 @@ class ImageGrid:
         return cls.points(dem.grid_positions(spacing, frame, center))
 
     @classmethod
+    def on_map(
+        cls,
+        crs: str | int,
+        *,
+        bounds: Sequence[float] | np.ndarray | None = None,
+        spacing: float | Sequence[float] | np.ndarray | None = None,
+        heights: ArrayLike | ElevationModel = 0.0,
+    ) -> ImageGrid:
+        """Pixels on a regular grid of a map, Earth-fixed (pip install sarcl[maps]); row 0 is the southernmost.
+
+        crs      coordinate reference system, as pyproj takes it: "EPSG:32633" (UTM), "EPSG:4326" (degrees)
+        bounds   (west, south, east, north), in units of the CRS; None: those of the elevation model
+        spacing  of (rows, columns), in units of the CRS; None: that of the elevation model
+        heights  above the ellipsoid, m: a number, one for each pixel, or an elevation model; pixels without are empty
+
+        `Image.save` writes an image on this grid as GeoTIFF without resampling. ValueError for an unknown CRS, one that
+        does not reach the bounds, and units that do not fit; MemoryError: too many pixels; ImportError without pyproj.
+        """
+        from .maps.map_grid import on_map
+
+        text, axes, positions = on_map(crs, bounds, spacing, heights)
+        return replace(cls.points(positions), crs=text, map_axes=axes)
+
+    @classmethod
     def zero_doppler(cls, times: ArrayLike, ranges: ArrayLike, positions: ArrayLike) -> ImageGrid:
         """Positions, m (rows, columns, 3), by zero-Doppler time, s (rows,), and slant range, m (columns,).
 
@@ -199,7 +230,7 @@ class ImageGrid:
 
         place = Place(longitude, latitude, height)
         if self.center is None or self.x_axis is None or self.y_axis is None:
-            return replace(self, listed=place.positions(self.positions))
+            return replace(self, listed=place.positions(self.positions), crs=None, map_axes=None)
         axes: dict[str, Any] = {name: getattr(self, name) @ place.axes for name in ("x_axis", "y_axis")}
         return replace(self, center=place.positions(self.center), **axes)
 
@@ -252,7 +283,12 @@ class ImageGrid:
         listed = self.listed[tuple(slice(r.start, r.stop, r.step) for r in ranges)]
         if self.times is not None and self.ranges is not None:
             return ImageGrid.zero_doppler(self.times[list(ranges[0])], self.ranges[list(ranges[1])], listed)
-        return ImageGrid.points(listed)
+        grid = ImageGrid.points(listed)
+        if self.map_axes is None:
+            return grid
+        x, y, dx, dy = self.map_axes
+        (a, b), (i, j) = (ranges[0].start, ranges[1].start), (ranges[0].step, ranges[1].step)
+        return replace(grid, crs=self.crs, map_axes=np.array([x + b * dx, y + a * dy, dx * j, dy * i]))
 
     @property
     def x(self) -> NDArray[np.float64]:

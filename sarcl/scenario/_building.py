@@ -77,7 +77,7 @@ class Builder:
         if place is None:
             return self.one("grid")
         ((kind, table),) = self.section("grid").items()
-        if kind == "zero_doppler":  # Earth-fixed by its nature
+        if kind in ("zero_doppler", "on_map"):  # Earth-fixed by its nature
             return self.one("grid")
         with self.scenario.where.blame(("grid", kind), table):
             local = on_terrain(place, table) if kind == "on_terrain" else table

@@ -72,7 +72,7 @@ _CALLS: dict[str, dict[str, str]] = {
     "materials": {"": "scene.material:Material"},
     "place": {"": "earth.place:Place.above"},
     "scene": _kinds("scene.scene:Scene.", "points from_mesh from_heights from_dem facets"),  # and all shapes
-    "grid": _kinds("model.image_grid:ImageGrid.", "plane points on_terrain zero_doppler"),
+    "grid": _kinds("model.image_grid:ImageGrid.", "plane points on_terrain on_map zero_doppler"),
     **{verb: {"": f"verbs:{verb}"} for verb in ECHOES},
     "noise": {"": "effects.noise:add_noise"},
     **{verb: {"": f"verbs:{verb}"} for verb in IMAGES},

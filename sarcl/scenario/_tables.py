@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..base import wgs84
 from ..earth.place import Place
 from ..earth.state_vectors import StateVectors
 from ..earth.two_line import TwoLineElements
@@ -52,6 +53,11 @@ def table_of(value: Any) -> Any:
     if isinstance(value, ImageGrid):
         if value.times is not None:
             return {"zero_doppler": {"times": value.times, "ranges": value.ranges, "positions": value.listed}}
+        if value.map_axes is not None:
+            x, y, dx, dy = value.map_axes
+            bounds = x - dx / 2, y - dy / 2, x + (value.shape[1] - 0.5) * dx, y + (value.shape[0] - 0.5) * dy
+            heights = wgs84.geodetic(value.positions)[2]
+            return {"on_map": {"crs": value.crs, "bounds": bounds, "spacing": (dy, dx), "heights": heights}}
         if not value.is_plane:
             return {"points": {"positions": value.listed}}
         return {"plane": _without_none(value, ("center", "shape", "spacing", "normal", "x_axis"))}

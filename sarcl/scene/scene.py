@@ -283,7 +283,7 @@ class Scene(NotebookTable):
         point_roughness: ArrayLike = 0.0,
         external: bool = False,
     ) -> Scene:
-        """Terrain from an elevation model that rasterio reads (GeoTIFF and others), on WGS84: pip install sarcl[dem].
+        """Terrain from an elevation model that rasterio reads (GeoTIFF and others), on WGS84: pip install sarcl[maps].
 
         bounds   (west, south, east, north), degrees, default the whole file
         center   (longitude, latitude[, height]), degrees and m: origin of the local frame, default the centre of the

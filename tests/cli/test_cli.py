@@ -196,7 +196,7 @@ def test_an_output_that_cannot_be_written_is_found_before_the_work(raw_file, her
 
 
 def test_outputs_of_unknown_kind_or_named_twice_are_refused(raw_file, capsys, no_work):
-    assert "ends in '.jpg'; choose a name that ends in .png, .h5, .nitf, .zarr or .nc" in refused(
+    assert "ends in '.jpg'; choose a name that ends in .png, .h5, .nitf, .zarr, .nc or .tif" in refused(
         capsys, "focus", raw_file, "-o", "a.jpg"
     )
     assert "name one file twice" in refused(capsys, "focus", raw_file, "-o", "a.png", "-o", "./a.png")

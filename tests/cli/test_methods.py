@@ -78,7 +78,7 @@ def test_range_doppler_is_the_function(here, capsys):
 
 
 def test_heights_may_be_an_elevation_model(here, capsys):
-    rasterio = pytest.importorskip("rasterio", reason="no rasterio: pip install sarcl[dem]")
+    rasterio = pytest.importorskip("rasterio", reason="no rasterio: pip install sarcl[maps]")
     longitude, latitude, _ = sarcl.wgs84.geodetic(CENTER)
     with rasterio.open(
         "dem.tif", "w", driver="GTiff", height=21, width=21, count=1, dtype="float32", nodata=-9999, crs="EPSG:4326",
@@ -90,6 +90,19 @@ def test_heights_may_be_an_elevation_model(here, capsys):
     run(*argv, "--heights-above", "EGM96", "--geoid", "20", "-o", "dem.h5")
     heights = sarcl.wgs84.geodetic(sarcl.read("dem.h5").grid.positions)[2]
     assert heights == pytest.approx(200.0, abs=1e-3)
+
+
+def test_images_become_maps_where_their_place_is_known(here, capsys):
+    rasterio = pytest.importorskip("rasterio", reason="no rasterio: pip install sarcl[maps]")
+    argv = ["focus", "orbit.h5", "--side", "right", "--heights", "200", "--shape", "40", "40"]
+    run(*argv, "-o", "x.tif", "-o", "x.h5", "--map-value", "db", "--map-crs", "EPSG:4326")
+    with rasterio.open("x.tif") as file:
+        assert file.crs.to_epsg() == 4326 and file.descriptions == ("db",)
+        longitude, latitude, _ = sarcl.wgs84.geodetic(sarcl.read("x.h5").grid.center)
+        assert file.bounds.left < longitude < file.bounds.right and file.bounds.bottom < latitude < file.bounds.top
+    assert "no coordinate reference system" in refused(capsys, *argv, "-o", "y.tif", "--map-crs", "UTM")
+    assert "local frame" in refused(capsys, "focus", "local.h5", "-o", "y.tif")
+    assert not (here / "y.tif").exists()
 
 
 def test_polar_format_and_backproject_choose_a_plane_on_the_earth(here, capsys):

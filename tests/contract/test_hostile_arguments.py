@@ -74,6 +74,10 @@ CALLS = {
         DEM.grid_positions, {"spacing": (1e3, 1e3), "frame": "local", "center": (12.05, 42.05)}, None
     ),
     "on_terrain": (sarcl.ImageGrid.on_terrain, {"dem": DEM, "spacing": 1e3}, "dem spacing center frame"),
+    "on_map": (
+        sarcl.ImageGrid.on_map, {"crs": "EPSG:4326", "bounds": (12, 42, 12.1, 42.1), "spacing": 0.01, "heights": 0.0},
+        "crs bounds spacing heights",
+    ),
     "Radar.amplitude": (
         RADAR.amplitude, {"frequency": 1e9, "tx_range": 1.0, "rx_range": 1.0, "tx_gain": 1.0, "rx_gain": 1.0}, None
     ),

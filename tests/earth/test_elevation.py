@@ -128,7 +128,7 @@ def test_a_grid_on_terrain_is_even_over_the_ground_and_at_its_height(frame):
 
 
 def test_a_grid_on_terrain_lies_on_the_scene_of_the_same_file(data_folder):
-    pytest.importorskip("rasterio", reason="no rasterio: pip install sarcl[dem]")
+    pytest.importorskip("rasterio", reason="no rasterio: pip install sarcl[maps]")
     path = data_folder / "dem/Rome-30m-DEM.tif"
     options = dict(bounds=(12.50, 41.95, 12.51, 41.96), heights="EGM96", geoid=48.3, center=(12.505, 41.955))
     scene = sarcl.Scene.from_dem(path, **options)

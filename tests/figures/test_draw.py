@@ -173,14 +173,14 @@ def test_an_empty_image_is_black_and_a_constant_one_white(value, level, shape):
 def test_axes_count_metres_from_the_pixel_that_image_grids_count_from():
     grid = sarcl.ImageGrid.plane(shape=(5, 8), spacing=(0.5, 0.25))
     for along, n in enumerate(grid.shape):
-        _, low, high, _ = axes.image_axis(n, along, grid.spacing)
+        _, low, high, _ = decibels.PixelAxes(grid.spacing).axis(n, along)
         centres = low + (np.arange(n) + 0.5) * (high - low) / n
         xyz = grid.at(*(np.arange(n), 0)[:: 1 - 2 * along])
         np.testing.assert_allclose(centres, xyz[:, 1 - along], atol=1e-12)
 
 
 def test_axes_without_spacing_count_pixels():
-    assert axes.image_axis(10, 0, None)[:3] == ("row", -0.5, 9.5)
+    assert decibels.PixelAxes().axis(10, 0)[:3] == ("row", -0.5, 9.5)
     assert axes.ticks_between(-0.5, 0.5, 5, least=1.0) == (1.0, [0.0])
 
 

@@ -14,7 +14,7 @@ import pytest
 import sarcl
 from sarcl.scene.triangles import centroids, normals
 
-rasterio = pytest.importorskip("rasterio", reason="no rasterio: pip install sarcl[dem]")
+rasterio = pytest.importorskip("rasterio", reason="no rasterio: pip install sarcl[maps]")
 
 A, F = 6378137.0, 1 / 298.257223563
 E2 = F * (2 - F)
@@ -387,7 +387,7 @@ def test_without_rasterio_the_message_says_what_to_install(tmp_path, monkeypatch
 
     path = tif(tmp_path / "a.tif")
     monkeypatch.setattr(builtins, "__import__", without)
-    with pytest.raises(ImportError, match=r"pip install sarcl\[dem\]"):
+    with pytest.raises(ImportError, match=r"pip install sarcl\[maps\]"):
         sarcl.Scene.from_dem(path)
 
 

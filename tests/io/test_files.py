@@ -671,7 +671,7 @@ def test_a_new_format_is_one_file_and_one_line_of_the_table(tmp_path, monkeypatc
     image.save(tmp_path / "a.toy")
     again = sarcl.read(tmp_path / "a.toy")
     assert same(again.data, image.data) and again.gain == 3.0 and same(again.grid.positions, image.grid.positions)
-    with pytest.raises(ValueError, match=r"choose '\.png', '\.h5', '\.nitf', '\.zarr', '\.nc' or '\.toy'"):
+    with pytest.raises(ValueError, match=r"choose '\.png', '\.h5', '\.nitf', '\.zarr', '\.nc', '\.tif' or '\.toy'"):
         image.save(tmp_path / "a.bmp")
     (tmp_path / "b.toy").write_bytes(b"12345")
     with pytest.raises(
@@ -682,7 +682,7 @@ def test_a_new_format_is_one_file_and_one_line_of_the_table(tmp_path, monkeypatc
     with pytest.raises(SystemExit):
         main(["focus", "--help"])
     said = " ".join(capsys.readouterr().out.split())
-    assert "toys (.toy)" in said and ".png, .h5, .nitf, .zarr, .nc or .toy" in said
+    assert "toys (.toy)" in said and ".png, .h5, .nitf, .zarr, .nc, .tif or .toy" in said
     assert formats.named("a.toy", formats.writing("image", by_blocks=True)) is None
 
 

@@ -58,7 +58,7 @@ def gotcha_file(path):
 
 
 def raster_file(path):
-    rasterio = pytest.importorskip("rasterio", reason="no rasterio: pip install sarcl[dem]")
+    rasterio = pytest.importorskip("rasterio", reason="no rasterio: pip install sarcl[maps]")
     driver = {".tif": "GTiff", ".asc": "AAIGrid"}[path.suffix]
     made = path.with_name("made.tif")
     with rasterio.open(

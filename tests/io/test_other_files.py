@@ -109,7 +109,7 @@ def test_materials_elsewhere_are_refused_unless_allowed(inside, library):
 
 
 def tif(path, crs="EPSG:4979"):
-    rasterio = pytest.importorskip("rasterio", reason="no rasterio: pip install sarcl[dem]")
+    rasterio = pytest.importorskip("rasterio", reason="no rasterio: pip install sarcl[maps]")
     with rasterio.open(
         path, "w", driver="GTiff", height=4, width=5, count=1, dtype="float32", crs=crs,
         transform=rasterio.Affine(0.001, 0, 12, 0, -0.001, 42),

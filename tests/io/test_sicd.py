@@ -336,7 +336,7 @@ def test_wrong_arguments_are_refused(tmp_path):
     coarse = sarcl.Image(np.zeros((10, 10), "c8"), sarcl.ImageGrid.plane(shape=10, spacing=2.0))
     with pytest.raises(ValueError, match="focus on a finer grid"):
         saved(case, coarse, path)
-    with pytest.raises(ValueError, match="for SICD, and"):
+    with pytest.raises(ValueError, match=r"for SICD \(.nitf, .ntf or .sicd\), and"):
         image.save(tmp_path / "x.h5", collection=case.raw)
     with pytest.raises(TypeError, match="colour"):
         image.save(path, colour=1)

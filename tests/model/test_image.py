@@ -233,7 +233,7 @@ BAD = {
     "too many looks": (lambda: image().multilook((12, 1)), r"looks \(12, 1\) is larger than the image \(11, 14\)"),
     "looks at a list of points": (
         lambda: sarcl.Image(np.ones(4), sarcl.ImageGrid.points(np.zeros((4, 3)))).multilook(2),
-        "multilook is for images on a plane, or by range_doppler",
+        "multilook is for images on a plane or a map, or by range_doppler",
     ),
     "floor above zero": (lambda: image().show(floor_db=5), "floor_db is 5"),
     "pixel not finite": (

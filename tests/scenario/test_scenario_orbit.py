@@ -154,7 +154,7 @@ def test_polar_format_and_backproject_focus_on_a_plane_of_the_place(tmp_path):
 @pytest.fixture
 def dem(tmp_path):
     """A file of heights above a geoid, 0.01 degrees to each side of the place, without data in a corner."""
-    rasterio = pytest.importorskip("rasterio", reason="no rasterio: pip install sarcl[dem]")
+    rasterio = pytest.importorskip("rasterio", reason="no rasterio: pip install sarcl[maps]")
     z = np.full((21, 21), 230.0, "f4")
     z[:3, :3] = -9999
     with rasterio.open(

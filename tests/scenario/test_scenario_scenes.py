@@ -122,7 +122,7 @@ def test_parts_of_a_mesh_and_files_beside_the_scenario(tmp_path):
 
 
 def test_an_elevation_model_and_a_geoid_beside_the_scenario(tmp_path):
-    rasterio = pytest.importorskip("rasterio", reason="no rasterio: pip install sarcl[dem]")
+    rasterio = pytest.importorskip("rasterio", reason="no rasterio: pip install sarcl[maps]")
     for name, z, step in (("dem", np.zeros((3, 4), "f4"), 0.001), ("geoid", np.full((4, 4), 48.0), 0.1)):
         with rasterio.open(
             tmp_path / f"{name}.tif", "w", driver="GTiff", height=z.shape[0], width=z.shape[1], count=1, dtype=z.dtype,

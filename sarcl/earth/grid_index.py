@@ -127,21 +127,7 @@ class Curvilinear:
         """Fractional (row, column) (2, n) of degrees (n,), whole at the points; NaN where there is none."""
         target = _coordinates(self.is_polar, self.middle, self.axes, longitude, latitude)
         size = np.array(self.points.shape[1:])[:, None]
-        index = self.affine[:, :2] @ target + self.affine[:, 2:]
-        for _ in range(ITERATIONS):
-            index = np.clip(index, -2.0, size + 1.0)
-            low = np.clip(np.floor(np.nan_to_num(index)).astype(np.int64), 0, size - 2)
-            (i, j), (u, v) = low, index - low
-            a, b, c, d = (self.points[:, i + m, j + n] for m in (0, 1) for n in (0, 1))
-            down, right = (1 - v) * (c - a) + v * (d - b), (1 - u) * (b - a) + u * (d - c)
-            off = target - ((1 - v) * a + v * b + u * down)
-            area = down[0] * right[1] - down[1] * right[0]
-            with np.errstate(divide="ignore", invalid="ignore"):
-                step = np.stack([off[0] * right[1] - off[1] * right[0], down[0] * off[1] - down[1] * off[0]]) / area
-            index = index + step
-            inside = ((index > -0.5) & (index < size - 0.5)).all(axis=0)
-            if not (np.abs(step[:, inside]) > 1e-3 * FOUND).any():
-                break
+        index, step, off = newton(self.points, target, self.affine[:, :2] @ target + self.affine[:, 2:])
         same = np.radians(SAME) if self.is_polar else SAME
         is_found = (np.abs(step) <= FOUND).all(axis=0) | (np.abs(off) <= same).all(axis=0)
         nearest = np.clip(np.rint(np.nan_to_num(index)).astype(np.int64), 0, size - 1)
@@ -166,3 +152,25 @@ def _coordinates(is_polar: bool, middle: float, axes: Floats, longitude: Floats,
         return np.stack([_around(longitude, middle), latitude])
     along, x, y = np.moveaxis(wgs84.up(longitude, latitude) @ axes.T, -1, 0)
     return np.asarray(np.where(along > ANTIPODE, 2 / np.maximum(1 + along, 1e-9) * np.stack([x, y]), 1e6))
+
+
+def newton(points: Floats, target: Floats, index: Floats) -> tuple[Floats, Floats, Floats]:
+    """Fractional (row, column) (2, n) of coordinates (2, n) in a grid of points (2, n_rows, n_columns), bilinear in
+    its cells, from a first guess; the last steps (2, n), which are large where there is no such place; and what
+    is left between coordinates and target (2, n) before that step."""
+    size = np.array(points.shape[1:])[:, None]
+    for _ in range(ITERATIONS):
+        index = np.clip(index, -2.0, size + 1.0)
+        low = np.clip(np.floor(np.nan_to_num(index)).astype(np.int64), 0, size - 2)
+        (i, j), (u, v) = low, index - low
+        a, b, c, d = (points[:, i + m, j + n] for m in (0, 1) for n in (0, 1))
+        down, right = (1 - v) * (c - a) + v * (d - b), (1 - u) * (b - a) + u * (d - c)
+        off = target - ((1 - v) * a + v * b + u * down)
+        area = down[0] * right[1] - down[1] * right[0]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            step = np.stack([off[0] * right[1] - off[1] * right[0], down[0] * off[1] - down[1] * off[0]]) / area
+        index = index + step
+        inside = ((index > -0.5) & (index < size - 0.5)).all(axis=0)
+        if not (np.abs(step[:, inside]) > 1e-3 * FOUND).any():
+            break
+    return index, step, off

@@ -1,0 +1,156 @@
+"""Images as GeoTIFF through rasterio (pip install sarcl[maps]): cloud-optimised files (COG) with overviews.
+
+Rows come block by block, north first. Overviews halve both axes until the image fits into one tile: levels in dB and
+amplitudes are averaged in power, which keeps the brightness of speckle; of complex numbers and masks every second
+pixel is taken, because a mean would cancel phases.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from . import output_paths
+
+if TYPE_CHECKING:
+    from types import ModuleType
+
+    import rasterio
+
+    from ..base.types import PathLike
+
+TILE = 512  # pixels along a tile's side, and rows that are written at once
+COPIES = 3  # of the pixels on the disk while a file is made: without tiles, overviews, and the file itself
+POWER = {"db": 10.0, "amplitude": 0.5}  # 10 log10 of a power, or its root
+
+
+@dataclass(frozen=True)
+class MapImage:
+    """Description of a GeoTIFF.
+
+    shape   (rows, columns);  corner  x and y of the outer corner of the north-western pixel;  step  of x and y, above 0
+    crs     as WKT
+    dtype   of all bands: float32, complex64 or complex128; NaN means no data
+    bands   their names;  kinds  "amplitude" and "db" are averaged in overviews, others are not
+    tags    metadata, as text
+    """
+
+    shape: tuple[int, int]
+    corner: tuple[float, float]
+    step: tuple[float, float]
+    crs: str
+    dtype: np.dtype
+    bands: tuple[str, ...] = ("data",)
+    kinds: tuple[str, ...] = ("complex",)
+    tags: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def n_bytes(self) -> int:
+        """Bytes of the pixels."""
+        return int(np.prod(self.shape)) * len(self.bands) * self.dtype.itemsize
+
+
+def import_rasterio(what: str) -> ModuleType:
+    """The package rasterio; ImportError names the extra."""
+    try:
+        import rasterio
+    except ImportError as exc:
+        raise ImportError(f"{what} needs the package rasterio: pip install sarcl[maps]") from exc
+    return rasterio
+
+
+def check_writable(path: PathLike, n_bytes: int = 0) -> Path:
+    """As `output_paths.check_writable`; ImportError where a package is missing."""
+    import_rasterio(str(path))
+    return output_paths.check_writable(path, n_bytes)
+
+
+def write(path: PathLike, header: MapImage, blocks: Iterable[np.ndarray]) -> None:
+    """Write blocks (bands, rows, columns), which follow one another from north to south; on any exception `path` is
+    as it was.
+
+    Raises what `check_writable` raises.
+    """
+    target = check_writable(path, COPIES * header.n_bytes)
+    rasterio = import_rasterio(str(path))
+    with (
+        rasterio.Env(GDAL_CACHEMAX=64, GDAL_DISABLE_READDIR_ON_OPEN="FALSE"),  # MB
+        tempfile.TemporaryDirectory(prefix=f".{target.name}-", dir=target.parent) as folder,
+    ):
+        from rasterio.shutil import copy
+
+        base = Path(folder) / "pixels.tif"
+        options = {"COMPRESS": "DEFLATE", "OVERVIEWS": "FORCE_USE_EXISTING", "BIGTIFF": "IF_SAFER"}
+        options |= {"BLOCKSIZE": str(TILE), "PREDICTOR": "NO" if header.dtype.kind == "c" else "YES"}
+        try:
+            _write_level(base, header, blocks)
+            _write_overviews(base, header)
+            output_paths.put_in_place(target, lambda new: copy(base, new, driver="COG", **options))
+        except rasterio.errors.RasterioError as exc:
+            raise OSError(f"cannot write {str(path)!r}: GDAL says {exc}; is there room on the disk?") from exc
+
+
+def _write_level(path: Path, header: MapImage, blocks: Iterable[np.ndarray]) -> None:
+    import rasterio
+    from rasterio.windows import Window
+
+    (x, y), (dx, dy) = header.corner, header.step
+    with rasterio.open(
+        path, "w", driver="GTiff", height=header.shape[0], width=header.shape[1], count=len(header.bands),
+        dtype=header.dtype, crs=rasterio.crs.CRS.from_wkt(header.crs), nodata=np.nan, tiled=True, blockxsize=TILE,
+        blockysize=TILE, transform=rasterio.Affine(dx, 0.0, x, 0.0, -dy, y), BIGTIFF="IF_SAFER", interleave="band",
+    ) as file:  # fmt: skip
+        file.update_tags(**header.tags)
+        for i, name in enumerate(header.bands, 1):
+            file.set_band_description(i, name)
+        row = 0
+        for block in blocks:
+            file.write(block, window=Window(0, row, block.shape[2], block.shape[1]))
+            row += block.shape[1]
+
+
+def _write_overviews(path: Path, header: MapImage) -> None:
+    """Each level is the overview of the one before: GDAL's file x.tif.ovr, and x.tif.ovr.ovr of that."""
+    import rasterio
+
+    while max(header.shape) > TILE:
+        half = replace(
+            header,
+            shape=(-(-header.shape[0] // 2), -(-header.shape[1] // 2)),
+            step=(2 * header.step[0], 2 * header.step[1]),
+            tags={},
+        )
+        with rasterio.open(path) as finer:
+            path = path.with_name(path.name + ".ovr")
+            _write_level(path, half, _halved(finer, header))
+        header = half
+
+
+def _halved(file: rasterio.DatasetReader, header: MapImage) -> Iterator[np.ndarray]:
+    """Blocks of half the rows and columns; pixels without data do not count."""
+    from rasterio.windows import Window
+
+    rows, columns = header.shape
+    for row in range(0, rows, 2 * TILE):
+        fine = file.read(window=Window(0, row, columns, min(2 * TILE, rows - row)))
+        coarse = fine[:, ::2, ::2].copy()
+        for i, kind in enumerate(header.kinds):
+            if kind in POWER:
+                coarse[i] = _mean_level(fine[i], kind)
+        yield coarse
+
+
+def _mean_level(values: np.ndarray, kind: str) -> np.ndarray:
+    """Means in power of 2 x 2 pixels with data, NaN where none has."""
+    power = 10 ** (values / 10) if kind == "db" else values**2
+    power = np.pad(power, [(0, n % 2) for n in power.shape], constant_values=np.nan)
+    quarters = power.reshape(power.shape[0] // 2, 2, -1, 2)
+    has_data = ~np.isnan(quarters)
+    with np.errstate(divide="ignore", invalid="ignore"):  # NaN of no data, and -inf dB of no signal
+        mean = np.where(has_data, quarters, 0).sum(axis=(1, 3)) / has_data.sum(axis=(1, 3))
+        return np.asarray(10 * np.log10(mean) if kind == "db" else np.sqrt(mean))
