@@ -69,7 +69,9 @@ def lit_parts_of(
     ground = np.zeros(len(given), bool) if antennas.forward else ground_of(pieces.original, antennas.ends)
     upper = upper_sides(pieces.original, ground)
     if ground.any() and pieces.original.heights is not None:
-        others = np.setdiff1d(pieces.of[wanted], np.flatnonzero(ground))
+        is_other = np.zeros(len(given), bool)
+        is_other[pieces.of[wanted]] = True
+        others = np.flatnonzero(is_other & ~ground)
         upper[others] = stand_above(pieces.original.heights, given[others])
     sides = scene.two_sided, wanted, given, pieces.of, ground, upper, antennas.forward
     options = {"max_bytes": rule.max_bytes, "margin": rule.margin}

@@ -186,11 +186,11 @@ def facets_on(grid: Heights, triangles: np.ndarray) -> np.ndarray | None:
     return is_on if abs(geometry.areas(triangles[is_on]).sum() - area) <= 1e-6 * area else None
 
 
-def stand_above(grid: Heights, triangles: np.ndarray) -> np.ndarray:
-    """True (k,) for facets, m (k, 3, 3), over a terrain that nowhere reaches higher below their boxes than their lowest
-    corners."""
+def stand_above(grid: Heights, corners: np.ndarray) -> np.ndarray:
+    """True (k,) for sets of corners, m (k, n, 3), over a terrain that nowhere reaches higher below their boxes than the
+    lowest corner."""
     x, y, z = grid
-    low, high = triangles.min(axis=1), triangles.max(axis=1)
+    low, high = corners.min(axis=1), corners.max(axis=1)
     is_above = (low[:, 0] >= x[0]) & (high[:, 0] <= x[-1]) & (low[:, 1] >= y[0]) & (high[:, 1] <= y[-1])
     ends = [
         (np.searchsorted(axis, low[:, i], side="right") - 1, np.searchsorted(axis, high[:, i]) + 1)
