@@ -7,6 +7,8 @@ z = 0 and heading along +x, then turned and placed.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import reduce
+from operator import add
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
@@ -14,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from ..scene.material import Material
 from ..scene.scene import Scene
+from ..scene.triangles import normals
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
@@ -25,23 +28,28 @@ HALF = 26.5  # m, half the side of the ground
 # Amplitude reflectivities, chosen to look like an airfield at X band
 METAL, CONCRETE, GRASS, PAINT, ASPHALT = 0.9, 0.6, 0.22, 0.22, 0.07
 ROUGH = Material(diagram="cos")  # rough on a scale below the facets, so that every surface has speckle
-# Heights of 4 mm: at 35 deg grazing, 9.6 GHz, 0.4 of the power stays in the mirror's direction. The edge of a shadow on
-# such facets is clipped exactly
-SLIGHTLY_ROUGH = Material(diagram="cos", height=4e-3)
-APRON, APRON_SIZE = (13.0, 9.5), (17.0, 12.0)  # m: middle and sides of the slab before the hangar
-APRON_HEIGHT = 0.03  # m, height of the slab above the ground
-FLAT_BEYOND = 3.0  # m about the apron, over which the ground rises to its own height
+# Slabs of concrete with heights of 4 mm: at 35 deg grazing, 9.6 GHz, 0.4 of the power stays in the mirror's direction.
+# Walls with heights of 7.5 mm leave 0.002 of the power: smoother ones would outshine all else
+SLAB, WALL = Material(diagram="cos", height=4e-3), Material(diagram="cos", height=7.5e-3)
+FACING = 0.99  # cosine between the normals of walls that reflect to slabs, and the way along the ground to the radar
+# Flat ground about objects: middle of the foot of the wall that faces the radar, width, and lengths behind that wall
+# and before it, m. The part before it is a slab, onto which the wall reflects, and back
+PADS = (
+    (14.0, 19.0, 12.6, 9.0, 5.9), (-9.5, 16.6, 2.8, 3.0, 8.0),
+    (-15.5, -8.25, 7.4, 4.5, 1.9), (-9.0, -15.25, 7.4, 4.5, 1.9),
+)  # fmt: skip
+SLAB_HEIGHT = 0.03  # m, above the ground
+UNDER = 0.12  # m, by which a slab reaches under its wall, which is turned by a degree
+FLAT_BEYOND = 3.0  # m about a pad, over which the ground rises to its own height
 
 
 def scene(edge: float, seed: int = 0) -> Scene:
     """The whole scene, the ground in cells whose edges are at most `edge`, m; `echo` cuts the objects."""
     random = np.random.default_rng(seed)
     out = ground(edge, random)
-    out = out + place(aeroplane(), (3.5, -5.5), 122, rough(METAL))
-    out = out + place(tank(), (-15.5, -12.0), 30, rough(METAL))
-    out = out + place(tank(), (-9.0, -18.5), 30, rough(METAL))
-    out = out + apron() + place(hangar(), (14.0, 15.0), 12, rough(CONCRETE))
-    out = out + place(tower(), (-9.5, 15.5), 25, rough(CONCRETE))
+    out = out + place(aeroplane(), (3.5, -5.5), 122, METAL) + slabs()
+    out = out + on_pad(hangar(), (14.0, 15.0), 1, CONCRETE) + on_pad(tower(), (-9.5, 15.5), -1, CONCRETE)
+    out = out + on_pad(tank(), (-15.5, -10.0), 1, METAL) + on_pad(tank(), (-9.0, -17.0), 179, METAL)
     for x, y, height in TREES:
         out = out + tree((x, y, relief(x, y)), height, random)
     return out
@@ -58,22 +66,31 @@ def rough(level: float) -> Material:
     return replace(ROUGH, reflectivity=level)
 
 
-def place(meshes: list[Trimesh], at: tuple[float, float], heading_deg: float, material: Material) -> Scene:
-    """Meshes turned by a heading and placed on the ground."""
-    position = (*at, float(relief(*at)))
+def place(
+    meshes: list[Trimesh], at: tuple[float, float], heading_deg: float, level: float, height: float | None = None
+) -> Scene:
+    """Rough meshes turned by a heading and placed on the ground, or at a height, m."""
+    position = (*at, float(relief(*at)) if height is None else height)
     c, s = np.cos(np.radians(heading_deg)), np.sin(np.radians(heading_deg))
     turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
-    parts = [Scene.from_mesh(m, material=material, position=position, rotation=turn) for m in meshes]
-    for part in parts[1:]:
-        parts[0] = parts[0] + part
-    return parts[0]
+    parts = (Scene.from_mesh(m, material=rough(level), position=position, rotation=turn) for m in meshes)
+    return reduce(add, parts)
+
+
+def on_pad(meshes: list[Trimesh], at: tuple[float, float], heading_deg: float, level: float) -> Scene:
+    """As `place`, on a pad; the upright walls that face the radar are smooth enough to reflect to its slab."""
+    out = place(meshes, at, heading_deg, level, SLAB_HEIGHT)
+    is_wall = normals(out.triangles)[:, 1] > FACING
+    return replace(out, materials=(*out.materials, WALL), material=np.where(is_wall, len(out.materials), out.material))
 
 
 def relief(x: NumberOrArray, y: NumberOrArray) -> NumberOrArray:
-    """Height of the ground, m: flat near the taxiway and under the apron, gently undulating away from them."""
-    beside = [np.maximum(np.abs(at - APRON[i]) - APRON_SIZE[i] / 2, 0) for i, at in enumerate((x, y))]
+    """Height of the ground, m: flat near the taxiway and on pads, gently undulating away from them."""
     away = 1 - np.exp(-((taxiway(x, y) / 12) ** 2))
-    away = away * (1 - np.exp(-(beside[0] ** 2 + beside[1] ** 2) / FLAT_BEYOND**2))
+    for middle, foot, width, behind, before in PADS:
+        outside = np.abs(x - middle) - width / 2, np.abs(y - foot - (before - behind) / 2) - (before + behind) / 2
+        beside = sum(np.maximum(distance, 0) ** 2 for distance in outside)
+        away = away * (1 - np.exp(-beside / FLAT_BEYOND**2))
     return away * (0.5 * np.sin(x / 6.5 + 1) * np.cos(y / 8.0) + 0.25 * np.sin((x + 2 * y) / 5.1))
 
 
@@ -97,12 +114,15 @@ def ground(edge: float, random: np.random.Generator) -> Scene:
     return replace(bare, reflectivity=np.clip(level, 0, 1))
 
 
-def apron() -> Scene:
-    """A slab of slightly rough concrete in front of the hangar, on which its shadow falls."""
+def slabs() -> Scene:
+    """Slabs of concrete before walls, with which they make corners."""
     from ..scene import shapes
 
-    slab = shapes.plate(APRON_SIZE, material=replace(SLIGHTLY_ROUGH, reflectivity=CONCRETE))
-    return slab.moved((*APRON, APRON_HEIGHT))
+    material = replace(SLAB, reflectivity=CONCRETE)
+    sides = [
+        ((x, foot + (before - UNDER) / 2, SLAB_HEIGHT), (width, before + UNDER)) for x, foot, width, _, before in PADS
+    ]
+    return reduce(add, (shapes.plate(size, material=material).moved(middle) for middle, size in sides))
 
 
 def patches(x: np.ndarray, y: np.ndarray, random: np.random.Generator) -> np.ndarray:
@@ -200,7 +220,7 @@ def tower() -> list[Trimesh]:
     mast = trimesh.creation.cylinder(radius=0.15, height=3, sections=8)
     mast.apply_translation((0, 0, 11))
     return [
-        hull(square(2.4, 0) + square(2.0, 7)),
+        hull(square(2.2, 0) + square(2.2, 7)),
         hull(square(2.8, 7) + square(4.4, 9.4)),
         hull(square(4.4, 9.4) + square(3.0, 10)),
         mast,

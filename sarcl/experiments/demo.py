@@ -27,8 +27,9 @@ GRAZING_DEG = 35.0
 DISTANCE = 10e3  # m
 EXTENT = 50.0  # m of the picture's side
 TOLERANCE = 1e-2
+BOUNCES = 3  # reflections
 WINDOW: Window = ("taylor", 35, 5)  # without a window side lobes would fill the shadows
-FLOOR_DB, PERCENTILE = -40.0, 99.9  # black, dB below white; white, per cent of the pixels
+FLOOR_DB, PERCENTILE = -40.0, 98.5  # black, dB below white; white, per cent of the pixels
 
 
 @dataclass(frozen=True)
@@ -105,7 +106,14 @@ def run(
     scene = _demo_scene.scene(setting.edge, seed)
     clock.stage("scene", f"an airfield of {len(scene.triangles):,} facets, made by code")
     raw = echo(
-        scene, setting.waveform(), setting.track(), seed=seed, tolerance=TOLERANCE, device=opened, progress=progress
+        scene,
+        setting.waveform(),
+        setting.track(),
+        bounces=BOUNCES,
+        seed=seed,
+        tolerance=TOLERANCE,
+        device=opened,
+        progress=progress,
     )
     clock.stage("echo", f"{raw.n_rows} pulses of {raw.n_samples} samples{_rate(raw, 'facet x pulse')}")
     image = backproject(raw, setting.grid(), window=WINDOW, tolerance=TOLERANCE, device=opened, progress=progress)

@@ -14,7 +14,7 @@ from ..numerics.pulse_geometry import PulseGeometry
 from ..opencl.device import Device
 from ..scene import triangles as geometry
 from ..scene.scene import Scene
-from ..scene.terrain import Heights, clear_of
+from ..scene.terrain import Heights, clear_of, stand_above
 from ..visibility.illumination import Illumination, IlluminationTask, Occlusion, illuminated
 from ..visibility.lit_parts import ON_PLANE, FacetPieces, LitParts, ground_of, upper_sides
 from ..visibility.swept_shadows import far_slopes, never_shaded
@@ -67,7 +67,13 @@ def lit_parts_of(
     scene, given = pieces.scene, pieces.original.triangles
     # forward scatter passes through the ground's own body: all of its facets count
     ground = np.zeros(len(given), bool) if antennas.forward else ground_of(pieces.original, antennas.ends)
-    sides = scene.two_sided, wanted, given, pieces.of, ground, upper_sides(pieces.original, ground), antennas.forward
+    upper = upper_sides(pieces.original, ground)
+    if ground.any() and pieces.original.heights is not None:
+        is_other = np.zeros(len(given), bool)
+        is_other[pieces.of[wanted]] = True
+        others = np.flatnonzero(is_other & ~ground)
+        upper[others] = stand_above(pieces.original.heights, given[others])
+    sides = scene.two_sided, wanted, given, pieces.of, ground, upper, antennas.forward
     options = {"max_bytes": rule.max_bytes, "margin": rule.margin}
     return LitParts(device, FacetPieces(scene.triangles, *sides), given, antennas.ends, progress=progress, **options)
 

@@ -186,6 +186,22 @@ def facets_on(grid: Heights, triangles: np.ndarray) -> np.ndarray | None:
     return is_on if abs(geometry.areas(triangles[is_on]).sum() - area) <= 1e-6 * area else None
 
 
+def stand_above(grid: Heights, corners: np.ndarray) -> np.ndarray:
+    """True (k,) for sets of corners, m (k, n, 3), over a terrain that nowhere reaches higher below their boxes than the
+    lowest corner."""
+    x, y, z = grid
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    is_above = (low[:, 0] >= x[0]) & (high[:, 0] <= x[-1]) & (low[:, 1] >= y[0]) & (high[:, 1] <= y[-1])
+    ends = [
+        (np.searchsorted(axis, low[:, i], side="right") - 1, np.searchsorted(axis, high[:, i]) + 1)
+        for i, axis in enumerate((x, y))
+    ]
+    for k in np.flatnonzero(is_above).tolist():
+        (left, right), (bottom, top) = ((first[k], stop[k]) for first, stop in ends)
+        is_above[k] = z[bottom:top, left:right].max() <= low[k, 2]
+    return is_above
+
+
 def raised(grid: Heights, before: np.ndarray, after: np.ndarray) -> Heights | None:
     """The terrain after its corners, m (k, 3, 3), have moved up or down; None where they moved sideways too."""
     x, y, z = grid

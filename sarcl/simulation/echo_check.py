@@ -153,7 +153,7 @@ def _bounced(scene: BounceScene, view: ChannelView, pulse: int) -> np.ndarray:
 
     antennas, surfaces, coatings = view.antennas, scene.surfaces, scene.coatings
     values, counts = BounceSpreader(scene, view).values(np.array([pulse]), view.frequencies, exact=True)
-    if len(scene.mirrors) > MOST_REFLECTORS or view.weights.is_needed or counts.outside_window:
+    if len(scene.mirrors) > MOST_REFLECTORS or view.weights.is_needed or counts.outside_window or surfaces.ground:
         return np.asarray(values[0])
     eps = np.stack([coatings.permittivity(f)[coatings.material] for f in view.frequencies.tolist()])
     reflectivity = coatings.reflectivity * surfaces.mirrors

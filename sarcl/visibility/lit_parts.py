@@ -10,7 +10,7 @@ import numpy as np
 
 from ..base.boxes import box
 from ..base.constants import EDGE_ON
-from ..base.vectors import dot, unit
+from ..base.vectors import dot, rising, unit
 from ..opencl.choose_device import with_float64
 from ..opencl.device import Device
 from ..scene.scene import Scene
@@ -67,7 +67,8 @@ class FacetPieces:
     given      facets, m (m, 3, 3), of which the pieces are parts, and  of  which (k,). What antennas see of these is
                computed first, and then of the pieces of those that are not seen whole
     ground     (n,) bool, or one for all: occluders that make up a complete terrain below all antennas
-    upper      (m,) bool, or one for all: given facets of which the upper side of that terrain alone reflects
+    upper      (m,) bool, or one for all: given facets from which waves leave above that terrain: those that stand above
+               it, and its own of which the upper side alone reflects
     forward    a second antenna sees what the first one lights from any side, shaded by other bodies alone
     """
 
@@ -164,17 +165,16 @@ class LitParts:
 
     def _look(self, parents: Receivers, ends: list[np.ndarray], progress: Callable[[int, int], object] | None) -> None:
         """Find blocks of pulses, the pairs of pieces of each within `max_bytes`, and which are dark or partly lit."""
-        kept, solid = 0, np.arange(len(self._occluders))
+        kept = 0
         dark_pulses = np.zeros(len(self._child), np.int64)
         changing = np.zeros(len(self._child), bool)
-        limits = self._limits(ends, solid)
-        n = len(parents.index)
-        few = FEW * n <= len(solid) and n * len(solid) <= MOST_PAIRS
-        for outer in self._spans(ends, [max(WIDE, limit) if few else limit for limit in limits]):
+        limits, n = self._limits(ends, np.arange(len(self._occluders))), len(parents.index)
+        for outer in self._spans(ends, [max(WIDE, limit) for limit in limits]):
             within = [end[outer.first : outer.stop] for end in ends]
-            casters, spans = solid, list(self._spans(within, limits, outer.first))
-            if len(spans) > 2:
-                casters = np.unique(self._pairs(parents, outer, solid)[:, 1])
+            spans = list(self._spans(within, limits, outer.first))
+            casters = self._casters(parents, outer)
+            if len(spans) > 2 and FEW * n <= len(self._occluders) and n * len(casters) <= MOST_PAIRS:
+                casters = rising(self._pairs(parents, outer, casters)[:, 1])
                 limits_of = self._limits(within, casters) if len(casters) else None
                 spans = [outer] if limits_of is None else list(self._spans(within, limits_of, outer.first))
             for span in spans:
@@ -195,6 +195,20 @@ class LitParts:
         dark = dark_pulses == len(ends[0])
         self.dark[self._pieces.index], self.partly[self._pieces.index] = dark, changing & ~dark
 
+    def _casters(self, receivers: Receivers, span: _Span) -> np.ndarray:
+        """Numbers of the occluders that may shade receivers from antennas of a span: a line of sight that leaves a
+        terrain upwards enters it again only where that slopes away from the antenna."""
+        if not (self._upward.any() and receivers.upper.all()):
+            return np.arange(len(self._occluders))
+        return np.flatnonzero(~np.all([self._is_near(at, self._turned(span)) for at in span.at], axis=0))
+
+    def _is_near(self, at: np.ndarray, turn: float) -> np.ndarray:
+        """Occluders of the terrain that face antennas within `turn`, rad, of a place, m (3,): (n,) bool."""
+        is_near = self._upward[:, 2] > 0
+        rows = np.flatnonzero(is_near)
+        is_near[rows] = dot(self._upward[rows], unit(at - self._occluders[rows, 0])) > turn
+        return np.asarray(is_near)
+
     def _limits(self, ends: list[np.ndarray], casters: np.ndarray) -> list[float]:
         """Angles, rad, by which each antenna may turn within a block of pulses for which these occluders count."""
         width = float(np.median(np.sqrt(areas(self._occluders[casters]))))
@@ -212,7 +226,7 @@ class LitParts:
     def _seen(self, receivers: Receivers, pairs: np.ndarray, antennas: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Receivers of which some pulse does not see the whole (n,) bool, and how many pulses see nothing of each: of
         those of which some pulse sees a part, too few."""
-        which = np.unique(pairs[:, 0])
+        which = rising(pairs[:, 0])
         is_shaded, dark = np.zeros(len(receivers.index), bool), np.zeros(len(receivers.index), np.int64)
         if self._margin:  # other antennas may see what these do not
             is_shaded[which] = True
@@ -236,18 +250,23 @@ class LitParts:
         """Pairs of a piece and an occluder that may shade it, among the pairs of the facets that they are parts of."""
         if not self._cut:
             return block.parents
-        parents = np.unique(block.parents[:, 0])
-        rows = np.flatnonzero(np.isin(self._child, parents))
-        pairs = self._pairs(self._pieces.part(rows), block.span, np.unique(block.parents[:, 1]))
+        is_shaded = np.zeros(len(self._parent), bool)
+        is_shaded[block.parents[:, 0]] = True
+        rows = np.flatnonzero(is_shaded[self._child])
+        pairs = self._pairs(self._pieces.part(rows), block.span, rising(block.parents[:, 1]))
         pairs[:, 0] = rows[pairs[:, 0]]
         return pairs
+
+    def _turned(self, span: _Span) -> float:
+        """Angle, rad, by which directions to antennas differ from that to the one from which a span is seen."""
+        away = min(float(np.linalg.norm(at - np.clip(at, *self._bounds))) for at in span.at)
+        return min(span.turn + 1e-6 + (2 * self._margin / away if away else 2.0) * (self._margin > 0), 2.0)
 
     def _pairs(self, r: Receivers, span: _Span, numbers: np.ndarray) -> np.ndarray:
         """Pairs of a receiver and an occluder, of these numbers, that may cast a shadow on it from pulses of a span."""
         antennas, solid = span.at, self._occluders[numbers]
         about = solid - self._origin
-        away = min(float(np.linalg.norm(at - np.clip(at, *self._bounds))) for at in antennas)
-        turn = min(span.turn + 1e-6 + (2 * self._margin / away if away else 2.0) * (self._margin > 0), 2.0)
+        turn = self._turned(span)
         cosines = [dot(r.normal, unit(at - r.center)) for at in antennas]
         # a facet is not seen from a side that is turned away from an antenna by more than directions change
         # and between two antennas, one of which may be edge-on to it (physical_optics.py:lit_share)
@@ -291,12 +310,12 @@ class LitParts:
                 return which[pairs[:, 0]] * len(solid) + casters[pairs[:, 1]]
 
             # a line of sight that leaves the ground upwards enters it again only where it slopes away from the antenna
-            near = dot(self._upward[numbers], unit(at - solid[:, 0])) > turn
+            near = self._is_near(at, turn)[numbers]
             yield among(seen, np.flatnonzero(~near))
             yield among(seen[~r.upper[seen]], np.flatnonzero(near))
 
         found_of = (found(at, *side) for at, side in zip(antennas, sides, strict=True))
-        key = np.unique(np.concatenate([part for parts in found_of for part in parts]))
+        key = rising(np.concatenate([part for parts in found_of for part in parts]))
         pairs = np.stack([key // len(solid), numbers[key % len(solid)]], axis=1)
         return np.asarray(pairs[self._clipper.sorted_out(r, pairs, span.antennas, self._margin) != MISSED])
 

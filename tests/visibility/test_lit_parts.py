@@ -9,6 +9,7 @@ from helpers.lit_cases import lit_polygon
 import sarcl
 from sarcl.base.vectors import unit
 from sarcl.reference.lit_part import lit_part
+from sarcl.scene.terrain import stand_above
 from sarcl.scene.triangles import normals
 from sarcl.visibility import _shadow_pairs
 from sarcl.visibility._shadow_pairs import candidate_pairs
@@ -280,18 +281,25 @@ def test_an_edge_under_more_shadows_than_are_listed_at_once(device):
         np.testing.assert_allclose(mean[pulse, 0], integral, atol=TOLERANCE)
 
 
+@pytest.mark.parametrize("stands", [False, True])
 @pytest.mark.parametrize("bistatic", [False, True])
-def test_only_slopes_that_face_away_from_an_antenna_shade_a_terrain(device, bistatic):
-    """Hills with a house sunk in them, from low antennas: the shadows of every facet, clipped one by one."""
+def test_only_slopes_that_face_away_from_an_antenna_shade_a_terrain(device, bistatic, stands):
+    """Hills with a house sunk in them, or standing above them, from low antennas: the shadows of every facet, clipped
+    one by one."""
     axis = np.linspace(-15.0, 15.0, 6)
-    hills = sarcl.Scene.from_heights(axis, axis, np.random.default_rng(3).normal(0.0, 2.0, (6, 6))).triangles
-    facets = np.concatenate([hills, sarcl.shapes.box((5.0, 7.0, 9.0)).moved((1.0, 2.0, -4.0)).triangles])
+    terrain = sarcl.Scene.from_heights(axis, axis, np.random.default_rng(3).normal(0.0, 2.0, (6, 6)))
+    hills = terrain.triangles
+    place = (12.0, -12.0, terrain.heights[2][:2, 4:].max()) if stands else (1.0, 2.0, -4.0)
+    facets = np.concatenate([hills, sarcl.shapes.box((5.0, 5.0 if stands else 7.0, 9.0)).moved(place).triangles])
     on_ground = np.arange(len(facets)) < len(hills)
+    is_above = stand_above(terrain.heights, facets)
+    assert is_above[~on_ground].all() == stands
+    upper = on_ground | (is_above & stands)
     ends = [np.array([[-150.0, y, 40.0] for y in (-9.0, 0.0, 9.0)])]
     if bistatic:
         ends.append(np.array([[-90.0, y, 35.0] for y in (80.0, 82.0, 84.0)]))
     every = np.ones(len(facets), bool)
-    pieces = FacetPieces(facets, ~every, every, facets, np.arange(len(facets)), on_ground, on_ground)
+    pieces = FacetPieces(facets, ~every, every, facets, np.arange(len(facets)), on_ground, upper)
     parts = LitParts(device, pieces, facets, ends, max_bytes=1e8)
     faces = np.all([((end[1] - facets[:, 0]) * normals(facets)).sum(axis=1) > 0 for end in ends], axis=0)
     share = np.where(parts.dark, 0.0, 1.0)

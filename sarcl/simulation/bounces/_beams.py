@@ -12,8 +12,10 @@ from functools import cached_property
 
 import numpy as np
 
+from ...base.boxes import box
 from ...base.constants import EDGE_ON
 from ...base.vectors import dot, unit
+from ...scene.terrain import Heights, is_overlooked, stand_above
 from ._facet_tree import MOST_PAIRS, Cones, FacetTree
 from ._polygons import Polygons, apart, folded, joined
 
@@ -25,7 +27,34 @@ TURNED_AWAY = (
     2 * EDGE_ON
 )  # sine below which a facet is turned away from a receiver: there physical optics has faded out
 MOST_ANGLE = 1.55  # rad, of a cone: wider ones hold everything in front
+MOST_LEGS = 5_000  # that are compared with the ground below them before its facets are looked at
 ROWS_AT_ONCE = 200_000  # pairs of a beam and a facet that are looked at together
+
+
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """A complete terrain that only casts shadows, and not on the legs that run above all of it.
+
+    triangles  m (n, 3, 3), about `origin`, m (3,), and  heights  not about it
+    overlooked  lines of sight from all antennas to the scene climb more steeply than it
+    """
+
+    triangles: np.ndarray
+    heights: Heights
+    origin: np.ndarray
+    overlooked: bool = False
+
+    @cached_property
+    def surfaces(self) -> Surfaces:
+        """Its facets."""
+        flags = np.zeros((3, len(self.triangles)), bool)
+        return Surfaces(Polygons.of(self.triangles), *flags)
+
+    def may_shade(self, corners: np.ndarray) -> np.ndarray:
+        """Whether it may shade legs between places, m (k, n, 3): (k,)."""
+        if len(corners) > MOST_LEGS:
+            return np.ones(len(corners), bool)
+        return ~stand_above(self.heights, corners + self.origin)
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +62,7 @@ class Surfaces:
     """Facets that reflect, convex and about the scene's centre; those not in `mirrors` only cast shadows.
 
     two_sided, mirrors  (k,) bool;  closed  (k,) bool: those of closed bodies, whose shadows are those of the facets
-    that face the light;  most_pairs  of a beam and a facet that are looked at together
+    that face the light;  most_pairs  of a beam and a facet that are looked at together;  ground  besides
     """
 
     polygons: Polygons
@@ -41,6 +70,7 @@ class Surfaces:
     mirrors: np.ndarray
     closed: np.ndarray
     most_pairs: int = MOST_PAIRS
+    ground: Ground | None = None
 
     @property
     def corners(self) -> np.ndarray:
@@ -65,8 +95,9 @@ class Surfaces:
     @cached_property
     def diagonal(self) -> float:
         """Diagonal of the box of all facets, m."""
-        corners = self.corners.reshape(-1, 3)
-        return float(np.linalg.norm(corners.max(axis=0) - corners.min(axis=0)))
+        parts = [self.corners] if self.ground is None else [self.corners, self.ground.triangles]
+        low, high = box(np.concatenate([box(part.reshape(-1, 3)) for part in parts]))
+        return float(np.linalg.norm(high - low))
 
     @cached_property
     def tree(self) -> FacetTree:
@@ -88,10 +119,14 @@ class Surfaces:
         others are dark within, whether their facets have two sides or one."""
         corners = self.corners[self.closed].reshape(-1, 3)
         low, high = corners.min(axis=0, initial=np.inf), corners.max(axis=0, initial=-np.inf)
-        within = ((antennas >= low) & (antennas <= high)).all(axis=1).any()
+        within, ground = ((antennas >= low) & (antennas <= high)).all(axis=1).any(), self.ground
+        if ground is not None:
+            bounds = box(self.corners.reshape(-1, 3)) + ground.origin
+            ends = [antennas + ground.origin]
+            ground = replace(ground, overlooked=is_overlooked(ground.heights, bounds, ends))
         if within:
-            return replace(self, closed=np.zeros_like(self.closed))
-        return replace(self, two_sided=self.two_sided & ~self.closed)
+            return replace(self, closed=np.zeros_like(self.closed), ground=ground)
+        return replace(self, two_sided=self.two_sided & ~self.closed, ground=ground)
 
     def side(self, facets: np.ndarray, normal: np.ndarray) -> np.ndarray:
         """1 (n,) where facets (n,) reflect on the side of their own normal, else 0; normal  on that side (n, 3)."""
@@ -145,12 +180,17 @@ class Beams:
         """The first beam of each chain (c,)."""
         return np.searchsorted(self.chain, np.arange(len(self.chains)))
 
+    def boxes(self, polygons: Polygons) -> np.ndarray:
+        """Corners, the least and the greatest, m (c, 2, 3), of boxes about polygons (k) of all beams of each chain."""
+        corners = polygons.corners.swapaxes(1, 2)
+        low = np.minimum.reduceat(folded(np.minimum, corners), self.first_of)
+        return np.stack([low, np.maximum.reduceat(folded(np.maximum, corners), self.first_of)], axis=1)
+
     def bounds(self, polygons: Polygons) -> tuple[np.ndarray, np.ndarray]:
         """Centres, m (c, 3), and radii, m (c,), of spheres about polygons (k) of all beams of each chain."""
         if not len(self):
             return np.zeros((0, 3)), np.zeros(0)
-        low = np.minimum.reduceat(folded(np.minimum, polygons.corners.swapaxes(1, 2)), self.first_of)
-        high = np.maximum.reduceat(folded(np.maximum, polygons.corners.swapaxes(1, 2)), self.first_of)
+        low, high = self.boxes(polygons).swapaxes(0, 1)
         return (low + high) / 2, np.linalg.norm(high - low, axis=1) / 2
 
     def rows_of(self, chain: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

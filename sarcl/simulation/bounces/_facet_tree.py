@@ -30,6 +30,10 @@ class Cones:
     widening: np.ndarray
     reach: np.ndarray
 
+    def part(self, rows: np.ndarray) -> Cones:
+        """Cones `rows` (n,)."""
+        return Cones(self.center[rows], self.axis[rows], self.radius[rows], self.widening[rows], self.reach[rows])
+
     def meet(self, which: np.ndarray, place: np.ndarray, size: np.ndarray) -> np.ndarray:
         """Whether cones `which` (n,) come near spheres about places, m (n, 3), of radii `size`, m (n,)."""
         step = place - self.center[which]

@@ -9,7 +9,7 @@ import numpy as np
 from ...base.vectors import cross, dot, unit
 from ._beams import LEAST_AREA, TURNED_AWAY, Beams, Surfaces, faces, first, in_blocks, mirrored
 from ._facet_tree import Cones
-from ._polygons import PAIRS_AT_ONCE, Polygons, Shadows, folded, less_shadows
+from ._polygons import PAIRS_AT_ONCE, Polygons, Shadows, folded, joined, less_shadows
 
 EDGE_ON = 1e-6  # sine below which an antenna that is edge-on to a facet casts no shadows on it
 DIRECTIONS = 6  # across a leg, in which the outlines of beams and of what may lie in their way are compared
@@ -123,23 +123,37 @@ def _between(
     length = np.maximum.reduceat(np.linalg.norm(end.center - start.center, axis=1), beams.first_of)
     length = length + radius + beams.bounds(start)[1]
     cones = Cones(center, unit(toward), radius, np.full(len(radius), np.tan(min(2 * turn, 1.5))), length)
-    chain, occluder = surfaces.tree.within(cones)
-    rows = np.flatnonzero(_overlap(beams, end, cones, surfaces.corners, chain, occluder, surfaces.snap))
-    chain, occluder = chain[rows], occluder[rows]
     facets = beams.chains[:, leg - 1 : leg] if leg == 1 or receives else beams.chains[:, leg - 2 : leg]
+
+    def of(shading: Surfaces, chain: np.ndarray, occluder: np.ndarray) -> tuple[np.ndarray, Polygons]:
+        rows = np.flatnonzero(_overlap(beams, end, cones, shading.corners, chain, occluder, surfaces.snap))
+        chain, occluder = chain[rows], occluder[rows]
+        sine = dot(shading.normals[occluder], unit(image[beams.first_of[chain]] - shading.centers[occluder]))
+        rows = np.flatnonzero((sine > -2 * turn - EDGE_ON) | ~shading.closed[occluder])
+        chain, shapes = chain[rows], shading.polygons[occluder[rows]]
+        for number in range(leg, leg - facets.shape[1], -1):  # in front of the facets where the leg ends and begins
+            normal, point = beams.normals[chain, number - 1], surfaces.centers[beams.chains[chain, number - 1]]
+            height = shapes.heights(normal, point, surfaces.on_plane)
+            rows = np.flatnonzero(height.max(axis=1, initial=-np.inf) > 0)
+            chain, shapes = chain[rows], shapes[rows].clipped(height[rows])
+        for number in range(leg, beams.order):
+            normal, point = beams.normals[chain, number - 1], surfaces.centers[beams.chains[chain, number - 1]]
+            shapes = Polygons(mirrored(shapes.corners, normal, point), shapes.count)
+        return chain, shapes
+
+    chain, occluder = surfaces.tree.within(cones)
     is_between = (occluder[:, None] != facets[chain]).all(axis=1)
-    sine = dot(surfaces.normals[occluder], unit(image[beams.first_of[chain]] - surfaces.centers[occluder]))
-    rows = np.flatnonzero(is_between & ((sine > -2 * turn - EDGE_ON) | ~surfaces.closed[occluder]))
-    chain, shapes = chain[rows], surfaces.polygons[occluder[rows]]
-    for number in range(leg, leg - facets.shape[1], -1):  # in front of the facets where the leg ends and begins
-        normal, point = beams.normals[chain, number - 1], surfaces.centers[beams.chains[chain, number - 1]]
-        height = shapes.heights(normal, point, surfaces.on_plane)
-        rows = np.flatnonzero(height.max(axis=1, initial=-np.inf) > 0)
-        chain, shapes = chain[rows], shapes[rows].clipped(height[rows])
-    for number in range(leg, beams.order):
-        normal, point = beams.normals[chain, number - 1], surfaces.centers[beams.chains[chain, number - 1]]
-        shapes = Polygons(mirrored(shapes.corners, normal, point), shapes.count)
-    return chain, shapes
+    chain, shapes = of(surfaces, chain[is_between], occluder[is_between])
+    ground = surfaces.ground
+    if ground is None:
+        return chain, shapes
+    ends = [end] if ground.overlooked and facets.shape[1] == 1 else [end, start]
+    rows = np.flatnonzero(ground.may_shade(np.concatenate([beams.boxes(part) for part in ends], axis=1)))
+    if not len(rows):
+        return chain, shapes
+    which, occluder = ground.surfaces.tree.within(cones.part(rows))
+    shaded, others = of(ground.surfaces, rows[which], occluder)
+    return np.concatenate([chain, shaded]), joined([shapes, others])
 
 
 def _overlap(

@@ -58,6 +58,21 @@ def test_a_run_at_a_tenth_of_the_tolerance_differs_by_less_than_the_tolerance(da
     assert coarse.report.plan["contributions by reflections"].count(":") == 3
 
 
+@pytest.mark.parametrize("width", [0.3, 1.6], ids=["steep", "gentle"])
+def test_a_terrain_shades_what_walls_and_slabs_reflect_as_its_facets_do(width):
+    """A ridge of 20 808 dark facets between a wall and the farther of two slabs, with and without its heights."""
+    axis = np.linspace(-6, 9, 103)
+    ridge = 1.7 * np.exp(-(((axis - 2) / width) ** 2)) * (np.abs(axis - 2) < 1) * (np.abs(axis) < 1.4)[:, None]
+    wall = shapes.plate((5, 3), rotation=(0, np.pi / 2, 0), position=(0, 0, 2.52))
+    slabs = shapes.plate((0.9, 3), position=(0.5, 0, 0.02)) + shapes.plate((0.8, 3), position=(3.5, 0, 0.02))
+    dark, options = sarcl.Material(reflectivity=0.0), {"reference": (0, 0, 0), "range_window": (-12, 12)}
+    ground, plain = (sarcl.Scene.from_heights(axis, axis, z, material=dark) for z in (ridge, 0 * ridge))
+    scenes = [part + wall + slabs for part in (ground, dataclasses.replace(ground, heights=None), plain)]
+    a, b, c = (sarcl.echo(s, CHIRP, TRACK, bounces=2, tolerance=1e-4, check=False, **options).samples for s in scenes)
+    assert np.linalg.norm(a - b) <= 1e-4 * np.linalg.norm(b)
+    assert np.linalg.norm(a - c) > 0.5 * np.linalg.norm(b)
+
+
 def test_cross_polarisation_of_single_reflections_is_reciprocal():
     block = shapes.box((1.0, 0.6, 0.8), material="concrete")
     scene = block + shapes.box((0.5, 0.7, 0.9), material="sand", position=(1.5, 0, 0), rotation=(0.3, 0.2, 0.5))
