@@ -23,7 +23,7 @@ from ..model.trajectory import Trajectory
 from ..model.waveform import Waveform
 from ..opencl.device import Device
 from ..reference import equations
-from ..reference.edges import edge_echo
+from ..reference.edges import border_echo, edge_echo
 from ..reference.polar_format import polar_format
 from ..scattering.physical_optics import triangle_integral
 from ..scene import shapes
@@ -146,7 +146,8 @@ def cross_section(name: str, n: int) -> VerbCase:
         return verbs.rcs(box, azimuth, elevation, CENTER, edges=True, **options)
 
     def compare(s: np.ndarray) -> Errors:
-        from ..scene.wedges import wedges  # imports scipy
+        from ..scene.facing_borders import facing_borders  # imports scipy
+        from ..scene.wedges import wedges
 
         wanted = np.zeros(CHECKED, complex)
         edges = wedges(box.triangles, box.two_sided, 0.35)
@@ -159,6 +160,8 @@ def cross_section(name: str, n: int) -> VerbCase:
             far, f = 1e7 * look, np.array([CENTER])
             for ends, *frame in zip(edges.ends, edges.inward, edges.normal, edges.number, strict=True):
                 parts = np.append(parts, edge_echo(ends, tuple(frame), f, (far, far), 1e7)[0, 0, 0])
+            for borders, shape in facing_borders(box.triangles, edges):
+                parts = np.append(parts, border_echo(borders, shape, f, (far, far), 1e7)[0, 0, 0])
             wanted[i] = parts.sum()
         return relative(s[checked], wanted, 0.0)
 

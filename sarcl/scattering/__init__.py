@@ -4,6 +4,7 @@ For other folders:
 
     antenna_weight_error   errors of antenna_weights over facets, over the band and in float32
     antenna_weights        antenna gains, spreading loss and the radar's factor per scatterer
+    double_diffraction     waves from one border of a flat face to another
     edge_diffraction       fringe currents of wedges: the physical theory of diffraction
     facet_kinds            which facets are mirrors, which are random, and which are alike
     facet_plan             subdivision and frequency nodes of facets for a tolerance

@@ -2,6 +2,7 @@
 
 For other folders:
 
+    facing_borders  borders of flat faces that face each other
     material    Material: permittivity, conductivity, roughness below the size of a facet
     scene       Scene: point scatterers and triangular facets
     shapes      solids of exact dimensions as facets: sphere, box, cone, tank ...

@@ -43,7 +43,7 @@ class Wedges:
 
 
 @dataclass(frozen=True, eq=False)
-class _Sides:
+class Sides:
     """Sides of facets, or parts of them.
 
     ends    numbers of their corners, the smaller first (n, 2);  facet  their facets (n,)
@@ -75,8 +75,8 @@ def wedges(triangles: np.ndarray, two_sided: np.ndarray, crease: float) -> Wedge
     """
     if not len(triangles):
         return Wedges(np.zeros((0, 2, 3)), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros((0, 2), np.int64))
-    corner, number = _merged(triangles)
-    sides = _cut_sides(corner, number)
+    corner, number = merged(triangles)
+    sides = cut_sides(corner, number)
     lo, hi = corner[sides.ends[:, 0]], corner[sides.ends[:, 1]]
     along, normal = unit(hi - lo), normals(triangles)[sides.facet]
     middle = triangles[sides.facet].mean(axis=1) - lo
@@ -105,10 +105,10 @@ def wedges(triangles: np.ndarray, two_sided: np.ndarray, crease: float) -> Wedge
     )
 
 
-def _merged(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def merged(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Corners, m (n, 3), and the numbers of each facet's (k, 3): one for those that are nearer than SAME."""
     corner, number = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
-    near = cKDTree(corner).query_pairs(_reach(triangles), output_type="ndarray")
+    near = cKDTree(corner).query_pairs(reach(triangles), output_type="ndarray")
     ones = np.ones(len(near), bool)
     _, label = connected_components(coo_array((ones, (near[:, 0], near[:, 1])), shape=(len(corner), len(corner))))
     label = label.astype(np.int64)
@@ -116,21 +116,22 @@ def _merged(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return corner[first], label[number.ravel()].reshape(-1, 3)
 
 
-def _reach(triangles: np.ndarray) -> float:
+def reach(triangles: np.ndarray) -> float:
+    """Distance, m, below which corners are one."""
     return float(SAME * np.ptp(box(triangles.reshape(-1, 3)), axis=0).max())
 
 
-def _cut_sides(corner: np.ndarray, number: np.ndarray) -> _Sides:
+def cut_sides(corner: np.ndarray, number: np.ndarray) -> Sides:
     """The sides of facets, those of one facet alone cut where corners of others lie on them."""
     ends = np.stack([number, np.roll(number, -1, axis=1)], axis=-1).reshape(-1, 2)
     facet = np.repeat(np.arange(len(number)), 3)
     real = ends[:, 0] != ends[:, 1]
-    sides = _Sides(np.sort(ends[real], axis=1), facet[real])
+    sides = Sides(np.sort(ends[real], axis=1), facet[real])
     alone = np.flatnonzero(sides.shared == 1)
     if not len(alone):
         return sides
     a, b = (corner[sides.ends[alone, i]] for i in range(2))
-    length, reach = np.linalg.norm(b - a, axis=1), SAME * float(np.ptp(corner, axis=0).max())
+    length, near_by = np.linalg.norm(b - a, axis=1), SAME * float(np.ptp(corner, axis=0).max())
     # corners of sides that are shared may lie on others too: a small box that stands on a large one
     tree = cKDTree(corner)
     pieces, facets = list[list[int]](), list[int]()
@@ -140,12 +141,12 @@ def _cut_sides(corner: np.ndarray, number: np.ndarray) -> _Sides:
         inside = np.setdiff1d(np.array(near, np.int64), sides.ends[side])
         at = (corner[inside] - start) @ way / n**2
         away = np.linalg.norm(corner[inside] - start - at[:, None] * way, axis=1)
-        on = (away < reach) & (at * n > reach) & (at * n < n - reach)
+        on = (away < near_by) & (at * n > near_by) & (at * n < n - near_by)
         stops = [sides.ends[side, 0], *inside[on][np.argsort(at[on])].tolist(), sides.ends[side, 1]]
         pieces += [sorted(pair) for pair in pairwise(stops)]
         facets += [sides.facet[side]] * (len(stops) - 1)
     others = np.setdiff1d(np.arange(len(sides.facet)), alone)
-    return _Sides(np.concatenate([sides.ends[others], np.array(pieces)]), np.concatenate([sides.facet[others], facets]))
+    return Sides(np.concatenate([sides.ends[others], np.array(pieces)]), np.concatenate([sides.facet[others], facets]))
 
 
 def joined(triangles: np.ndarray, to: np.ndarray) -> np.ndarray:
@@ -153,10 +154,10 @@ def joined(triangles: np.ndarray, to: np.ndarray) -> np.ndarray:
     if not to.any():
         return to
     corner = np.unique(triangles[to].reshape(-1, 3), axis=0)
-    reach = _reach(triangles)
-    low, high = box(corner) + np.array([[-reach], [reach]])
+    least = reach(triangles)
+    low, high = box(corner) + np.array([[-least], [least]])
     near = np.flatnonzero((((triangles >= low) & (triangles <= high)).all(axis=2)).any(axis=1) & ~to)
-    away, _ = cKDTree(corner).query(triangles[near].reshape(-1, 3), distance_upper_bound=reach)
+    away, _ = cKDTree(corner).query(triangles[near].reshape(-1, 3), distance_upper_bound=least)
     out = to.copy()
     out[near] = np.isfinite(away).reshape(-1, 3).any(axis=1)
     return out

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.special import hankel2
 
+from sarcl.scattering.double_diffraction import FaceBorders, double_matrix
 from sarcl.scattering.edge_diffraction import WedgeShape, edge_matrix
 
 X, Y, Z = np.eye(3)
@@ -49,6 +50,17 @@ def strip(width, is_along):
     return K / np.sqrt(np.pi) * np.cos(ANGLE) * width * np.sinc(phase / np.pi), edges
 
 
+def across(width):
+    """Waves from edge to edge across the strip, on both sides, E across."""
+    looks, n = np.stack([np.sin(ANGLE), np.cos(ANGLE), 0 * ANGLE], axis=1), len(ANGLE)
+    ones, out = np.ones((n, 1)), 0
+    for x in (X, -X):
+        shape = FaceBorders((ones * x, -ones * x), ones * Y, (np.full(n, 2.0), np.full(n, 2.0)))
+        phase = np.full((n, 1), K * width)
+        out = out + 2 * double_matrix(shape, looks, looks, ones * x, phase, (0, 0, 1))[:, 0, 0, 0]
+    return out * np.exp(-1j * K * width)
+
+
 def rms(values, wanted):
     """dB, over the angles within 25 dB of the peak."""
     level = 20 * np.log10(np.abs(wanted))
@@ -62,3 +74,10 @@ def test_edges_are_those_of_a_strip_but_for_waves_from_edge_to_edge_across_it(wi
         wanted, (optics, edges) = moments(width, is_along), strip(width, is_along)
         assert rms(optics + edges, wanted) < gate
         assert rms(optics, wanted) > 3 * rms(optics + edges, wanted)
+
+
+@pytest.mark.parametrize(("width", "gate"), [(1.0, 0.6), (2.2756, 0.45), (4.0, 0.08), (8.0, 0.02)])
+def test_waves_from_edge_to_edge_are_what_edges_lack(width, gate):
+    wanted, (optics, edges) = moments(width, 0), strip(width, 0)
+    assert rms(optics + edges + across(width), wanted) < gate
+    assert rms(optics + edges, wanted) > 3 * gate

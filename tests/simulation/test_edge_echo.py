@@ -5,7 +5,8 @@ import pytest
 
 import sarcl
 from sarcl import Material, Scene, Trajectory, Waveform, shapes
-from sarcl.reference.edges import edge_echo
+from sarcl.reference.edges import border_echo, edge_echo
+from sarcl.scene.facing_borders import facing_borders
 from sarcl.scene.wedges import wedges
 
 CHIRP = Waveform.chirp(center=9.6e9, bandwidth=300e6, duration=1e-6)
@@ -35,14 +36,19 @@ def summed(scene, raw, track, receiver=None, seen=None, per_wave=20):
     """The reference: elements of a 20th of a wavelength, or as many as asked for; and the norm of the edges at random
     phases."""
     edges = wedges(scene.triangles, scene.two_sided, 0.35)
+    parts = [
+        (edge_echo, ends, frame)
+        for ends, *frame in zip(edges.ends, edges.inward, edges.normal, edges.number, strict=True)
+    ]
+    parts += [(border_echo, *pair) for pair in facing_borders(scene.triangles, edges)]
     frequencies = raw.frequency[0] + raw.frequency_step[0] * np.arange(raw.n_samples)
     out, power = np.zeros((len(track.positions), 3, raw.n_samples), complex), 0.0
     rx = track.positions if receiver is None else receiver.positions
     for p, (to, back) in enumerate(zip(track.positions, rx, strict=True)):
         reference = (np.linalg.norm(to) + np.linalg.norm(back)) / 2
-        for ends, *frame in zip(edges.ends, edges.inward, edges.normal, edges.number, strict=True):
-            options = {"seen": seen, "per_wavelength": per_wave}
-            one = edge_echo(ends, tuple(frame), frequencies, (to, back), reference, **options)
+        for echo, ends, frame in parts:
+            options = {"seen": seen, "per_wavelength": per_wave if echo is edge_echo else min(per_wave, 100)}
+            one = echo(ends, tuple(frame), frequencies, (to, back), reference, **options)
             one = one.transpose(1, 2, 0)[[0, 0, 1], [0, 1, 1]]
             out[p], power = out[p] + one, power + (np.abs(one) ** 2).sum()
     return out, np.sqrt(power)
@@ -69,6 +75,43 @@ def test_edges_are_sums_over_their_elements_within_their_share_of_the_tolerance(
     assert close(got, wanted, max(norm, np.linalg.norm(wanted)), tolerance, raw)
     assert np.linalg.norm(wanted) > 1e-3 * np.linalg.norm(raw.samples)
     assert raw.report.predicted_error <= tolerance
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_random_faces_within_the_tolerance(seed):
+    """A prism whose walls lean, or its sheet, one antenna or two, near or far."""
+    random = np.random.default_rng(seed)
+    angle = np.sort(np.linspace(0, 2 * np.pi, 5)[:-1] + random.uniform(-0.4, 0.4, 4))
+    ring = 0.4 * np.stack([1.3 * np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    top = ring * random.uniform(0.8, 1.2) + [0, 0, 0.3]
+    faces = [[*ring[::-1]], [*top]] + [[ring[i - 1], ring[i], top[i], top[i - 1]] for i in range(4)]
+    faces = faces[1:2] if seed % 3 == 0 else faces
+    triangles = np.array([[face[0], face[i], face[i + 1]] for face in faces for i in (1, 2)])
+    scene = Scene.facets(triangles, two_sided=len(faces) == 1)
+    tolerance, distance = (1e-1, 1e-2, 1e-3)[seed % 3], 1e5 if seed % 4 == 1 else random.uniform(10, 60)
+    track = around(distance, n=1, incidence=random.uniform(0.3, 1.4), azimuth=random.uniform(0, 6))
+    receiver = around(0.8 * distance, n=1, incidence=0.7, azimuth=random.uniform(0, 6)) if seed % 2 else None
+    got, raw = edges_alone(scene, track, receiver=receiver, tolerance=tolerance, shadows=False)
+    wanted, norm = summed(scene, raw, track, receiver)
+    assert close(got, wanted, norm, tolerance, raw)
+
+
+def test_a_wall_on_a_face_stands_in_the_way_of_waves_along_it():
+    """An absorber 2 cm high between the longer borders of a strip, over two thirds of their length, shades neither."""
+    plate, track = shapes.plate((1.5, 0.2)), around(2e5, n=1, incidence=0.8, azimuth=np.pi / 2)
+    low, high = [[-0.5, 0, 0], [0.5, 0, 0]], [[0.5, 0, 0.02], [-0.5, 0, 0.02]]
+    wall = Scene.facets(np.array([[*low, high[0]], [low[0], *high]]), reflectivity=0.0)
+    options = {"skip": {"range window", "facing away"}}
+    (full, raw), (less, _) = (edges_alone(scene, track, **options) for scene in (plate, plate + wall))
+    pairs = list(facing_borders(plate.triangles, wedges(plate.triangles, plate.two_sided, 0.35)))
+    ends, frame = next(pair for pair in pairs if pair[1][2][2] > 0 and np.ptp(pair[0][0, :, 0]) > 1)
+    frequencies, place = raw.frequency[0] + raw.frequency_step[0] * np.arange(raw.n_samples), track.positions[0]
+    hidden = np.clip(ends, [-0.5, -1, 0], [0.5, 1, 0])
+    lost = border_echo(hidden, frame, frequencies, (place, place), np.linalg.norm(place))
+    assert np.linalg.norm(full[0] - less[0] - lost.transpose(1, 2, 0)[[0, 0, 1], [0, 1, 1]]) < 0.05 * np.linalg.norm(
+        lost
+    )
+    assert np.abs(lost).max() > 0.05
 
 
 def test_two_antennas():

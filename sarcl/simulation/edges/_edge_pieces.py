@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +13,9 @@ from ...opencl.device import Device
 from ...scattering.edge_diffraction import WedgeShape
 from ...scene.scene import Scene
 from ...visibility.rays import SceneRays
+
+if TYPE_CHECKING:
+    from ...scene.facing_borders import FacingBorders
 
 INSET = 1e-4  # of a piece's length: the ends of edges are looked at from so far inside, where only two facets meet
 OFF = 4.0  # over the least distance of rays: points on an edge are moved out of the facets by so much
@@ -77,12 +81,14 @@ class EdgePieces:
         return WedgeShape(self.shape.inward[edges], self.shape.normal[edges], self.shape.number[edges])
 
 
-def edge_pieces(scene: Scene, crease: float, longest: float) -> EdgePieces:
-    """The edges of a scene's smooth perfect conductors, in pieces no longer than `longest`, m.
+def edge_pieces(scene: Scene, crease: float, longest: float) -> tuple[EdgePieces, FacingBorders]:
+    """The edges of a scene's smooth perfect conductors, in pieces no longer than `longest`, m, and the borders of flat
+    faces that they make up.
 
     crease  rad: facets whose normals differ by less have no edge between them
     """
-    from ...scene.wedges import joined, wedges  # imports scipy
+    from ...scene.facing_borders import facing_borders  # imports scipy
+    from ...scene.wedges import joined, wedges
 
     smooth = np.array([m.conducting and m.height == 0 for m in scene.materials], bool)[scene.material]
     conductor = smooth & (scene.roughness == 0) & (scene.reflectivity > 0)
@@ -91,13 +97,14 @@ def edge_pieces(scene: Scene, crease: float, longest: float) -> EdgePieces:
     of_conductors = conductor[part[every.faces]]
     mine = every.chosen(np.flatnonzero(of_conductors.all(axis=1)))
     length = np.linalg.norm(mine.ends[:, 1] - mine.ends[:, 0], axis=1)
-    return EdgePieces(
+    pieces = EdgePieces(
         mine.ends,
         WedgeShape(mine.inward, mine.normal, mine.number),
         scene.reflectivity[part[mine.faces]].mean(axis=1),
         np.maximum(np.ceil(length / longest), 1).astype(int),
         int(of_conductors.any(axis=1).sum()) - len(mine),
     )
+    return pieces, facing_borders(scene.triangles[part], mine)
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +142,7 @@ class EdgeKnots:
 
 
 class EdgeLight:
-    """What antennas see of pieces of edges past the facets of a scene.
+    """What an antenna sees of pieces of edges past the facets of a scene.
 
     Corners of pieces are looked at. Where one end of a piece is seen and the other is not, the end of the shadow is
     searched for by halving. Shadows that begin and end within one piece are missed.
@@ -146,18 +153,18 @@ class EdgeLight:
         half = np.pi * pieces.shape.number[:, None] / 2  # along the middle of the space outside
         self._out = OFF * self.rays.least * (np.cos(half) * pieces.shape.inward + np.sin(half) * pieces.shape.normal)
 
-    def lit(self, antennas: list[np.ndarray]) -> np.ndarray:
-        """Where the part of each piece begins and ends that all antennas see: (m, n, 2), 0 to 1.
+    def lit(self, antenna: np.ndarray) -> np.ndarray:
+        """Where the part of each piece begins and ends that an antenna sees: (m, n, 2), 0 to 1.
 
-        antennas  places of one or two, m (m, 3) each, at m pulses
+        antenna  its places, m (m, 3), at m pulses
         """
         pieces = self.pieces
-        pulse, corner = np.nonzero(self._faced(antennas)[:, pieces.corner_edge])
+        pulse, corner = np.nonzero(self._faced(antenna)[:, pieces.corner_edge])
         edge = pieces.corner_edge[corner]
         inset = INSET / pieces.parts[edge]
-        seen = np.zeros((len(antennas[0]), len(pieces.corner_edge)), bool)
+        seen = np.zeros((len(antenna), len(pieces.corner_edge)), bool)
         share = np.clip(pieces.corner_share[corner], inset, 1 - inset)
-        seen[pulse, corner] = self._seen(edge, share, [places[pulse] for places in antennas])
+        seen[pulse, corner] = self._seen(edge, share, antenna[pulse])
         begins, ends = seen[:, pieces.first], seen[:, pieces.first + 1]
         lit = np.where((begins & ends)[..., None], [0.0, 1.0], 0.0)
         pulse, piece = np.nonzero(begins != ends)
@@ -166,30 +173,23 @@ class EdgeLight:
         low, high = np.zeros(len(pulse)), np.ones(len(pulse))
         for _ in range(HALVINGS if len(pulse) else 0):
             middle = (low + high) / 2
-            is_lit = self._seen(edge, start + middle * part, [places[pulse] for places in antennas])
+            is_lit = self._seen(edge, start + middle * part, antenna[pulse])
             low, high = np.where(is_lit == is_begun, middle, low), np.where(is_lit == is_begun, high, middle)
         border = (low + high) / 2
         lit[pulse, piece, 0], lit[pulse, piece, 1] = np.where(is_begun, 0, border), np.where(is_begun, border, 1)
         return lit
 
-    def _faced(self, antennas: list[np.ndarray]) -> np.ndarray:
-        """Whether antennas are outside of the wedges of edges, which may be seen only from there: (m, e)."""
+    def _faced(self, antenna: np.ndarray) -> np.ndarray:
+        """Whether an antenna is outside of the wedges of edges, which may be seen only from there: (m, e)."""
         pieces, shape = self.pieces, self.pieces.shape
-        angle, out = np.pi * shape.number[:, None], np.ones((len(antennas[0]), len(pieces.ends)), bool)
+        angle = np.pi * shape.number[:, None]
         normals = shape.normal, np.sin(angle) * shape.inward - np.cos(angle) * shape.normal
-        for places in antennas:
-            above = [places @ normal.T - dot(pieces.ends[:, 0], normal) for normal in normals]
-            out &= (above[0] >= 0) | (above[1] >= 0)
-        return out
+        above = [antenna @ normal.T - dot(pieces.ends[:, 0], normal) for normal in normals]
+        return np.asarray((above[0] >= 0) | (above[1] >= 0))
 
-    def _seen(self, edges: np.ndarray, shares: np.ndarray, antennas: list[np.ndarray]) -> np.ndarray:
-        """Whether antennas, m (n, 3) each, all see points on edges (n,) at shares of their lengths: (n,)."""
-        places = self.pieces.places(edges, shares) + self._out[edges]
-        seen = np.ones(len(edges), bool)
-        for antenna in antennas:
-            rows = np.flatnonzero(seen)
-            seen[rows] = ~self.rays.any_hit(places[rows], antenna[rows])
-        return seen
+    def _seen(self, edges: np.ndarray, shares: np.ndarray, antenna: np.ndarray) -> np.ndarray:
+        """Whether an antenna, m (n, 3), sees points on edges (n,) at shares of their lengths: (n,)."""
+        return ~self.rays.any_hit(self.pieces.places(edges, shares) + self._out[edges], antenna)
 
 
 def longest_piece(wavelength: float, cell: float, distance: float, tolerance: float) -> float:

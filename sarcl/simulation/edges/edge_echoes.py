@@ -20,7 +20,10 @@ from ...scene.scene import Scene
 from ..echo_request import EchoRequest
 from ..scene_plan import EDGES, SeenScene
 from ..spreading import ChannelView, Counts
+from ._border_pairs import BorderPairs
 from ._edge_pieces import EdgeKnots, EdgeLight, EdgePieces, edge_pieces, longest_piece
+from ._pair_echoes import PairEchoes
+from ._paths import paths_over, weigh
 
 # Errors of amplitudes that are interpolated over the band between 1, 2, ... frequencies, x^m/(m! 2^(m - 1)), where
 # x = pi/8 for pieces of a quarter of a resolution cell
@@ -40,12 +43,14 @@ class PreparedEdges:
 
     knots  where the coefficients of edges are computed
     light  what antennas see of the pieces; None: all of them;  error  of the echoes of edges, relative to their norm
+    pairs  of borders between which waves run along faces
     """
 
     pieces: EdgePieces
     knots: EdgeKnots
     light: EdgeLight | None
     error: float
+    pairs: BorderPairs
 
     def __len__(self) -> int:
         return len(self.pieces)
@@ -81,22 +86,26 @@ class PreparedEdges:
         device  that looks for shadows, None: nothing shades;  distance  m, of the nearest antenna
         """
         size = float(np.linalg.norm(np.diff(scene.bounds, axis=0)))
-        pieces = edge_pieces(scene, crease, longest if device is None else min(longest, size / PER_SIZE))
-        light = None if device is None or not len(pieces) else EdgeLight(pieces, device, scene)
-        return cls(pieces, EdgeKnots.of(pieces, distance, error / STEEP), light, error)
+        longest = longest if device is None else min(longest, size / PER_SIZE)
+        pieces, borders = edge_pieces(scene, crease, longest)
+        pairs = BorderPairs(borders, pieces, longest, distance, error / STEEP)
+        light = None
+        if device is not None and len(pieces):
+            light = EdgeLight(pieces, device, scene)
+            pairs.block(light.rays)
+        return cls(pieces, EdgeKnots.of(pieces, distance, error / STEEP), light, error, pairs)
 
 
 @dataclass(frozen=True, eq=False)
 class _Seen:
-    """What pulses see of pieces of edges: pairs of both, pulse by pulse.
+    """What pulses see of pieces of edges and of pairs of borders, pulse by pulse.
 
-    pulse, piece  numbers of each pair, that of the pulse among those at hand (k,)
-    amplitudes    complex128 (k, n_polarizations, m) at m frequencies, |a|^2 in m^2
-    delays        s, about those of the pulses' reference ranges (k,);  counts  of all pairs
+    pulse       the number among the pulses at hand (k,)
+    amplitudes  complex128 (k, n_polarizations, m) at m frequencies, |a|^2 in m^2
+    delays      s, about those of the pulses' reference ranges (k,);  counts  of pieces of edges at all pulses
     """
 
     pulse: np.ndarray
-    piece: np.ndarray
     amplitudes: np.ndarray
     delays: np.ndarray
     counts: Counts
@@ -112,6 +121,7 @@ class EdgeEchoes:
 
     def __init__(self, edges: PreparedEdges, view: ChannelView) -> None:
         self.pieces, self.knots, self.light, self.view = edges.pieces, edges.knots, edges.light, view
+        self.pairs, self._pair_echoes = edges.pairs, PairEchoes(edges.pairs, view)
         # pieces mostly cancel: an edge sends back as much as a wavelength of it, unless it is seen at right angles
         longest = float(edges.pieces.lengths.max(initial=0.0))
         gain = 1 + 2 * np.pi * float(view.frequencies[-1]) / SPEED_OF_LIGHT * longest
@@ -124,7 +134,8 @@ class EdgeEchoes:
     def describe(self) -> dict[str, Any]:
         """Words and numbers for a report."""
         left_out = {"edges left out": self.pieces.n_other} if self.pieces.n_other else {}
-        return {"edges": len(self.pieces.ends), "pieces of edges": len(self.pieces)} | left_out
+        words = {"edges": len(self.pieces.ends), "pieces of edges": len(self.pieces)}
+        return words | {"pairs of borders": len(self.pairs.parts)} | left_out
 
     def add(
         self, samples: np.ndarray, pulses: Sequence[int], clock: Clock, on_progress: Callable[[int], object]
@@ -167,8 +178,9 @@ class EdgeEchoes:
     def _batches(self, n_pulses: int, n_frequencies: int) -> Iterator[slice]:
         if not len(self):
             return iter(())
-        held = len(self) * n_frequencies * len(self.view.polarizations)
-        n = max(min(TOGETHER // len(self), AMPLITUDES // held), 1)
+        pieces = len(self) + len(self.pairs)
+        held = pieces * n_frequencies * len(self.view.polarizations)
+        n = max(min(TOGETHER // pieces, AMPLITUDES // held), 1)
         return (slice(first, min(first + n, n_pulses)) for first in range(0, n_pulses, n))
 
     def _seen(self, pulses: np.ndarray, frequencies: np.ndarray) -> _Seen:
@@ -180,12 +192,13 @@ class EdgeEchoes:
         """
         antennas, pieces, view = self.view.antennas, self.pieces, self.view
         ends = [antennas.tx[pulses]] if antennas.is_monostatic else [antennas.tx[pulses], antennas.rx[pulses]]
-        paths = _paths(ends, pieces.corners, antennas.reference_range[pulses])
+        paths = paths_over(ends, [pieces.corners] * len(ends), antennas.reference_range[pulses])
         begin, end = paths[:, pieces.first], paths[:, pieces.first + 1]
         away = (begin + end) / 2
         near, far = antennas.near[pulses, None], antennas.far[pulses, None]
         inside = (away >= near) & (away <= far) if view.gated else np.ones(away.shape, bool)
-        lit = np.broadcast_to([0.0, 1.0], (*away.shape, 2)) if self.light is None else self.light.lit(ends)
+        alone = None if self.light is None else [self.light.lit(places) for places in ends]
+        lit = np.broadcast_to([0.0, 1.0], (*away.shape, 2)) if alone is None else _common(alone)
         pulse, piece = np.nonzero(inside & (lit[..., 1] > lit[..., 0]))
         counts = Counts(inside.size, int((~inside).sum()), int(inside.sum()) - len(pulse))
         lit, edge = lit[pulse, piece], pieces.edge[piece]
@@ -198,8 +211,14 @@ class EdgeEchoes:
         cut = part < 1
         line[cut] *= np.exp(1j * phase[cut] * (middle[cut] - 0.5)[:, None])
         if view.weights.is_needed:
-            self._weigh(line, pulses, pulse, piece, frequencies)
-        return _Seen(pulse, piece, matrix[..., None] * line[:, None], 2 / SPEED_OF_LIGHT * away[pulse, piece], counts)
+            centers = (pieces.corners[pieces.first] + pieces.corners[pieces.first + 1]) / 2
+            weigh(line, centers[piece], view.weights, pulses, pulse, frequencies)
+        parts = [(pulse, matrix[..., None] * line[:, None], 2 / SPEED_OF_LIGHT * away[pulse, piece])]
+        if len(self.pairs):
+            parts += self._pair_echoes.seen(ends, pulses, frequencies, alone)
+        numbers, amplitudes, delays = (np.concatenate(one) for one in zip(*parts, strict=True))
+        order = np.argsort(numbers, kind="stable")
+        return _Seen(numbers[order], amplitudes[order], delays[order], counts)
 
     def _matrix(self, ends: list[np.ndarray], pulse: np.ndarray, edge: np.ndarray, share: np.ndarray) -> np.ndarray:
         """a/dl, complex128 (k, n_polarizations), of pairs of pulse and edge (k,) at shares of its length (k,)."""
@@ -218,31 +237,11 @@ class EdgeEchoes:
         first, second = values[number[pulse, before]], values[number[pulse, after]]
         return np.asarray(first + weight[:, None] * (second - first))
 
-    def _weigh(
-        self, line: np.ndarray, pulses: np.ndarray, pulse: np.ndarray, piece: np.ndarray, frequencies: np.ndarray
-    ) -> None:
-        """Multiply amplitudes (k, m) of pairs by the weights of antennas."""
-        centers = (self.pieces.corners[self.pieces.first] + self.pieces.corners[self.pieces.first + 1]) / 2
-        for p in np.unique(pulse).tolist():
-            rows = np.flatnonzero(pulse == p)
-            for m, f in enumerate(frequencies.tolist()):
-                line[rows, m] *= self.view.weights.weights(centers[piece[rows]], int(pulses[p]), f)
 
-
-def _paths(ends: list[np.ndarray], points: np.ndarray, reference: np.ndarray) -> np.ndarray:
-    """Half the paths over points, m (n, 3), about reference ranges (m,), m (m, n), to the rounding of float64 times the
-    distance of the points from one another: |t - x| = |t - c| + d.(d - 2 (t - c))/(|t - x| + |t - c|), d = x - c."""
-    center = points.mean(axis=0)
-    step, out = points - center, np.zeros((len(reference), len(points)))
-    middle = np.zeros(len(reference), np.longdouble)
-    for end in ends:
-        to = end - center
-        distance = np.sqrt((to.astype(np.longdouble) ** 2).sum(axis=1))
-        middle += distance / len(ends)
-        change = (step**2).sum(axis=1) - 2 * to @ step.T
-        short = distance.astype(np.float64)[:, None]
-        out += change / (np.sqrt(np.maximum(short**2 + change, 0)) + short) / len(ends)
-    return np.asarray(out + (middle - reference).astype(np.float64)[:, None])
+def _common(parts: list[np.ndarray]) -> np.ndarray:
+    """Where the intervals begin and end that parts (..., 2) have in common; equal where there is none."""
+    begin = np.maximum.reduce([part[..., 0] for part in parts])
+    return np.stack([begin, np.maximum(np.minimum.reduce([part[..., 1] for part in parts]), begin)], axis=-1)
 
 
 def _summed(amplitudes: np.ndarray, delays: np.ndarray, frequencies: np.ndarray) -> np.ndarray:

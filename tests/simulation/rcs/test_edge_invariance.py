@@ -5,7 +5,8 @@ import pytest
 
 import sarcl
 from sarcl import Scene, shapes
-from sarcl.reference.edges import edge_echo
+from sarcl.reference.edges import border_echo, edge_echo
+from sarcl.scene.facing_borders import facing_borders
 from sarcl.scene.wedges import wedges
 
 F = 3e9
@@ -62,6 +63,10 @@ def test_a_half_hidden_edge_is_the_edge_cut_at_the_end_of_its_shadow():
             seen = np.array([start, start + share * (stop - start)])
             one = edge_echo(seen, tuple(frame), np.array([F]), (1e8 * look, 1e8 * look), 1e8, per_wavelength=200)[0]
             wanted += one[[0, 1], [0, 1]]
+    for borders, frame in facing_borders(plate.triangles, border):
+        if np.ptp(borders[0, :, 0]) > 0.1:  # of the others, the one at x > 0 is dark
+            seen = np.minimum(borders, [-shift, 1, 1])
+            wanted += border_echo(seen, frame, np.array([F]), (1e8 * look, 1e8 * look), 1e8)[0][[0, 1], [0, 1]]
     assert difference(wanted, both - alone) < 2e-3  # the end of the shadow is found to 1/4096 of a piece
 
 
