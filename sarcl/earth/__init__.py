@@ -2,6 +2,7 @@
 
 For other folders:
 
+    dates          dates in UTC to seconds since an epoch
     elevation      ElevationModel: heights above the ellipsoid by longitude and latitude
     kepler         Kepler orbits about the rotating Earth
     light_time     positions of antennas while a pulse is on its way to the rotating Earth and back
