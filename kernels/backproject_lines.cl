@@ -56,7 +56,6 @@ INLINED int weigh_lines(group pulses, line_geometry line, __global const float *
     if (fabs(line.along) < LEAST_STEP) return 0;
     fv lane = lanes();
     float samples_of_T = FINE / line.along, farthest = 0;  // samples of T per sample of the profile
-#pragma unroll
     for (int v = 0; v < VECS; v++) {
         fv i = lane + (fv)(v * VW - SIDE / 2), none = 0, end = (fv)(SIDE / 2);
         fv centre = curvature_at(line, i, none, q_of_line(pulses, i)), q = q_of(pulses, i, end);
@@ -257,13 +256,22 @@ __kernel void backproject_lines(backproject_lines_numbers given, __global const 
             for (int j0 = 0; j0 < SIDE; j0 += SUMS * VW) {
                 fv re[SUMS], im[SUMS];
                 sum_line(pulses, r, j0, made, T, W, at, re, im);
+                if (n_pixels) {  // arrays of their own let this be a loop, whose code is built once, beside sums in registers
+                    fv of_pixels_re[SUMS], of_pixels_im[SUMS];
+#pragma unroll
+                    for (int v = 0; v < SUMS; v++) of_pixels_re[v] = re[v], of_pixels_im[v] = im[v];
+#pragma unroll 1
+                    for (int v = 0; v < SUMS; v++)
+                        for (int f = 0; f < n_pixels; f++)
+                            add_pixels(pulses, records + (size_t)by_pixels[f] * N_LINE, (fv)(r - SIDE / 2),
+                                       lanes() + (fv)(j0 + v * VW - SIDE / 2), profiles + 2 * (size_t)by_pixels[f] * stride,
+                                       stride, origin, table, &of_pixels_re[v], &of_pixels_im[v]);
+#pragma unroll
+                    for (int v = 0; v < SUMS; v++) re[v] = of_pixels_re[v], im[v] = of_pixels_im[v];
+                }
 #pragma unroll
                 for (int v = 0; v < SUMS; v++) {
                     int j = j0 + v * VW;
-                    for (int f = 0; f < n_pixels; f++)
-                        add_pixels(pulses, records + (size_t)by_pixels[f] * N_LINE, (fv)(r - SIDE / 2),
-                                   lanes() + (fv)(j - SIDE / 2), profiles + 2 * (size_t)by_pixels[f] * stride, stride, origin,
-                                   table, &re[v], &im[v]);
                     size_t pixel = (size_t)tile * (SIDE * SIDE) + (pulses.transposed ? j * SIDE + r : r * SIDE + j);
                     if (pulses.transposed) {
                         add_with_step(image, image + 2 * pixels, pixel, SIDE, re[v]);

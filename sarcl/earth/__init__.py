@@ -2,6 +2,7 @@
 
 For other folders:
 
+    dates          dates in UTC to seconds since an epoch
     elevation      ElevationModel: heights above the ellipsoid by longitude and latitude
     grid_index     rows and columns of longitudes and latitudes, or map coordinates, in a grid
     kepler         Kepler orbits about the rotating Earth

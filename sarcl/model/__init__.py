@@ -7,7 +7,6 @@ For other folders:
     antenna_pattern   gain of a pattern in given directions, its steepest slope, its extent
     concatenation     phase histories joined by their rows
     cphd/             phase histories as CPHD files
-    dates             dates in UTC to seconds since an epoch
     image             Image: pixels on a grid
     image_grid        ImageGrid: positions of the pixels
     lazy_rows         rows of arrays in files: selected, stacked, scaled and sliced without reading them
@@ -26,6 +25,7 @@ For other folders:
 For this folder alone:
 
     _costas           Costas permutations by the constructions of Welch and Golomb
+    _echo_rows        axes, samples and selected rows of a PhaseHistory: methods of it
     _grid_checks      checks of what an image grid is made of
     _labelled         images and echoes as datasets of xarray: fields, coordinates, units
     _orbit_arguments  arguments of Orbit: positions, spans of time

@@ -13,13 +13,13 @@ from numpy.typing import ArrayLike, NDArray
 from ..base import arguments, validation
 from ..base.types import PathLike
 from ..earth import rotation, viewing, zero_doppler
+from ..earth.dates import Date, date, seconds
 from ..earth.elevation import ElevationModel
 from ..earth.kepler import KeplerElements
 from ..earth.state_vectors import StateVectors
 from ..earth.two_line import TwoLineElements
 from ..io import orbit_files
 from ._orbit_arguments import Attitude, axes_of, ellipse, places, span_of, together
-from .dates import Date, date, seconds
 from .trajectory import BYTES_PER_PULSE, Trajectory
 
 LINES_DAYS = 1.0  # days before and after the epoch of two-line elements, whose error grows by kilometres per day

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal, Unpack
 
 import numpy as np
@@ -11,10 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..base import arguments, constants, validation
 from ..base.report import Report
-from ..base.text import NotebookTable, interval, size_text
+from ..base.text import interval, size_text
 from ..io import formats, hdf5
+from ._echo_rows import EchoRows
 from ._row_fields import LEAST_STEP, PER_ROW, RowFields, check_axis, one_per_row
-from .lazy_rows import in_memory, pick
+from .lazy_rows import in_memory
 
 if TYPE_CHECKING:
     import xarray
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class PhaseHistory(NotebookTable):
+class PhaseHistory(EchoRows):
     """Echoes s (n_rows, n_samples); a row is one (pulse, transmit channel, receive channel, polarisation).
 
     samples          complex; an array, memmap, HDF5 dataset or anything with shape, dtype and row slicing.
@@ -297,123 +298,6 @@ class PhaseHistory(NotebookTable):
 
         return phase_history_dataset(self)
 
-    @property
-    def shape(self) -> tuple[int, int]:
-        """(n_rows, n_samples), as of an array."""
-        return self.n_rows, self.n_samples
-
-    @property
-    def dtype(self) -> np.dtype[Any]:
-        """Number type of the samples."""
-        return np.dtype(self.samples.dtype)
-
-    @property
-    def ndim(self) -> int:
-        """2: rows and samples."""
-        return 2
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes of the samples, in memory or in a file."""
-        return self.n_rows * self.n_samples * self.dtype.itemsize
-
-    @property
-    def n_rows(self) -> int:
-        """Number of rows."""
-        return int(self.samples.shape[0])
-
-    @property
-    def n_samples(self) -> int:
-        """Number of frequencies per row."""
-        return int(self.samples.shape[1])
-
-    @property
-    def bandwidth(self) -> NDArray[np.float64]:
-        """n_samples frequency_step, Hz (n_rows,)."""
-        return self.n_samples * self.frequency_step
-
-    @property
-    def center_frequency(self) -> NDArray[np.float64]:
-        """Centre of the sampled band, Hz (n_rows,)."""
-        return self.frequency + (self.n_samples - 1) / 2 * self.frequency_step
-
-    @property
-    def swath(self) -> NDArray[np.float64]:
-        """Unambiguous range about the reference, m (n_rows,): +- half of c / (2 frequency_step)."""
-        return constants.SPEED_OF_LIGHT / (2 * self.frequency_step)
-
-    @property
-    def is_monostatic(self) -> bool:
-        """Whether transmitter and receiver have equal positions in every row."""
-        return self.rx is self.tx or np.array_equal(self.rx, self.tx)
-
-    def read(self, start: int, stop: int) -> np.ndarray:
-        """Samples of rows start ... stop - 1 in memory; a NaN or Inf raises ValueError with its index."""
-        start, stop = validation.count("start", start, None), validation.count("stop", stop, None)
-        if not 0 <= start <= stop <= self.n_rows:
-            raise IndexError(
-                f"rows {start} to {stop} were requested, but there are {self.n_rows}; give 0 <= start <= stop <= n_rows"
-            )
-        block = np.asarray(validation.unmasked("samples", self.samples[start:stop], first_row=start))
-        if block.shape != (stop - start, self.n_samples):
-            raise ValueError(
-                f"samples[{start}:{stop}] gave shape {block.shape}, wanted {(stop - start, self.n_samples)}: "
-                "slices of its source do not agree with its shape"
-            )
-        validation.finite("samples", block, first_row=start)
-        return block if block.dtype.isnative else block.astype(block.dtype.newbyteorder("="))
-
-    def __getitem__(self, rows: slice | Sequence[int] | np.ndarray) -> PhaseHistory:
-        """The selected rows (slice, index array or mask); a lazy source stays lazy."""
-        index = arguments.chosen("rows", rows, self.n_rows, "rows")
-        if index.size == 0:
-            raise ValueError(f"no row is left of {self.n_rows}; choose at least one")
-        names = ("frequency", "frequency_step", "tx", "rx", "reference_range", *PER_ROW)
-        picked = {n: getattr(self, n)[index] for n in names if getattr(self, n) is not None}
-        if self.rx is self.tx:
-            picked["rx"] = None
-        return replace(self, samples=pick(self.samples, index), **picked)
-
-    def select(
-        self, *, polarization: str | None = None, channel: int | None = None, sender: int | None = None
-    ) -> PhaseHistory:
-        """Rows of one polarisation ("HV"), receive channel, transmitting element. ValueError lists those that exist."""
-        is_selected, described = np.ones(self.n_rows, bool), "these data"
-        for name, values, value in (
-            ("polarization", self.polarization, polarization),
-            ("channel", self.rx_channel, channel),
-            ("sender", self.tx_channel, sender),
-        ):
-            if value is None:
-                continue
-            if values is None:
-                raise ValueError(f"these data name no {name}; it is the same for every row")
-            is_valid = isinstance(value, str) if name == "polarization" else isinstance(value, (int, np.integer))
-            if not is_valid or not (is_selected & (values == value)).any():
-                raise ValueError(
-                    f"{name} {value!r} is not in {described}; there are {sorted(set(values[is_selected].tolist()))}"
-                )
-            is_selected &= values == value
-            described = f"the rows of {name} {value!r}"
-        return self[is_selected]
-
-    def time_signal(self, oversample: int = 1) -> tuple[np.ndarray, np.ndarray]:
-        """Baseband signals in time: (delay about tau_ref, s (n,) or (n_rows, n); complex (n_rows, n)).
-
-        s~_p(t) = sum_n s_p(f_n) exp(+j 2 pi (f_n - fc) t), not normalised, fc the frequency of sample
-        n_samples//2. One delay axis where every row has the same frequency step.
-        """
-        n = self.n_samples * validation.count("oversample", oversample)
-        what = f"a signal of {n if n < 2**60 else 2.0**60:.3g} samples or more in {self.n_rows} rows"
-        validation.room(what, 48.0 * min(n, 2**60) * self.n_rows, "give a smaller oversample, or select rows")
-        lag = np.arange(n) - n // 2
-        step = self.frequency_step if np.ptp(self.frequency_step) else self.frequency_step[:1]
-        delay = lag / (n * step[:, None])
-        spectrum = np.zeros((self.n_rows, n), np.complex128)
-        spectrum[:, np.arange(self.n_samples) - self.n_samples // 2] = self.read(0, self.n_rows)
-        signal = np.fft.fftshift(np.fft.ifft(spectrum, axis=1), axes=1) * n
-        return (delay if len(delay) > 1 else delay[0]), signal
-
     def save(
         self,
         path: PathLike,
@@ -447,12 +331,10 @@ class PhaseHistory(NotebookTable):
         """
         if formats.named(arguments.path("path", path), [formats.CPHD]) is not None:
             from ..io.cphd import writing
-            from .cphd.collection import collection_of
+            from .cphd.collection import CphdOptions, collection_of
 
-            collection = collection_of(
-                self, origin=origin, axes=axes, metadata=metadata, domain=domain, sgn=sgn, version=version
-            )
-            writing.save(path, collection, self.read)
+            options = CphdOptions(origin, axes, metadata, domain, sgn, version)
+            writing.save(path, collection_of(self, options), self.read)
             return
         if not (origin is axes is metadata is None) or (domain, sgn, version) != ("FX", -1, "1.1.0"):
             raise ValueError(

@@ -94,7 +94,7 @@ class AmplitudeSamples:
         or where a table of gains may end among the scatterers.
         """
         kept = source.decimated(decimation)
-        if self.corner and self._turn(kept, decimation) > MOST_TURN:
+        if self.corner and self._turn(kept) > MOST_TURN:
             return np.inf
         if not self._in_tables(source) or not self._in_tables(kept):
             return np.inf
@@ -139,7 +139,7 @@ class AmplitudeSamples:
                     return False
         return True
 
-    def _turn(self, kept: AntennaWeights, decimation: Decimation) -> float:
+    def _turn(self, kept: AntennaWeights) -> float:
         """Largest change of the phase from a mirror's corner to its centre, rad, from one kept position to the next."""
         place, most = self.places.mean(axis=0), 0.0
         look = unit(kept.geometry.tx - place) + unit(kept.geometry.rx - place)

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 
 from ..base import wgs84
+from ..earth.dates import date
 from ..earth.place import Place
 from ..earth.state_vectors import StateVectors
 from ..earth.two_line import TwoLineElements
 from ..model.antenna import Antenna
 from ..model.antenna_array import AntennaArray
-from ..model.dates import date
 from ..model.image_grid import ImageGrid
 from ..model.orbit import Orbit
 from ..model.radar import Radar

@@ -3,7 +3,8 @@
 For other folders:
 
     facing_borders  borders of flat faces that face each other
-    material    Material: permittivity, conductivity, roughness below the size of a facet
+    material    Material: permittivity, conductivity, roughness below the size of a facet; the table of names
+    material_arguments  arguments that name materials, as a table and an index for each facet
     scene       Scene: point scatterers and triangular facets
     shapes      solids of exact dimensions as facets: sphere, box, cone, tank ...
     terrain     facets over grids of heights, and heights above them

@@ -18,7 +18,8 @@ from ..base.text import NotebookTable, interval
 from . import _changes, terrain
 from . import triangles as geometry
 from ._kept import Kept
-from .material import FacetMaterials, Material, MaterialLike, checked_table, merge, resolve
+from .material import Material
+from .material_arguments import FacetMaterials, MaterialLike, checked_table, merge, resolve
 
 if TYPE_CHECKING:
     import trimesh

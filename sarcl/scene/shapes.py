@@ -31,7 +31,7 @@ from ._target_rcs import dihedral_rcs as dihedral_rcs
 from ._target_rcs import luneburg_rcs as luneburg_rcs
 from ._target_rcs import top_hat_rcs as top_hat_rcs
 from ._target_rcs import trihedral_rcs as trihedral_rcs
-from .material import FacetMaterials, MaterialLike
+from .material_arguments import FacetMaterials, MaterialLike
 from .scene import Scene
 
 if TYPE_CHECKING:

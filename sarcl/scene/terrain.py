@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, DTypeLike
 
 from ..base import boxes, validation
 from . import triangles as geometry
-from .material import FacetMaterials, MaterialLike, resolve
+from .material_arguments import FacetMaterials, MaterialLike, resolve
 
 log = logging.getLogger(__name__)
 

@@ -70,7 +70,7 @@ def forecast_of(
     if work.preparing <= max(limits.prepared_share * work.seconds, limits.prepared_seconds):
         planned, prepared = planned.with_scene()
         clock.lap("plan")
-        estimate = _timed(task, planned, prepared, work)
+        estimate = _timed(planned, prepared, work)
     else:
         known = planned.scene.describe() | ({"facets": round(work.pieces)} if work.pieces else {})
         if 1e-6 * cost_model.JUDGED_FACET * len(planned.scene.seen.original.triangles) <= JUDGING * work.seconds:
@@ -109,7 +109,7 @@ def _expected_method(scene: ScenePlan, work: EchoWork) -> str:
     return "spread or factorized" if pays else "spread"
 
 
-def _timed(task: EchoTask, planned: PlannedEchoes, prepared: SceneEchoes, work: EchoWork) -> Estimate:
+def _timed(planned: PlannedEchoes, prepared: SceneEchoes, work: EchoWork) -> Estimate:
     """The errors of all pulses, and from a few of them the seconds and contributions of all."""
     shape, method = planned.channels.shape, planned.method
     n_pulses, pulse_by_pulse = shape[0], method

@@ -18,8 +18,9 @@ from helpers.cases import SCENARIO, noise_on, straight
 from test_messages import FOREIGN
 
 import sarcl
-from sarcl import array_factor, illumination, material, motion, noise, papers, pointing, radar, shapes, wgs84
+from sarcl import array_factor, illumination, motion, noise, papers, pointing, radar, shapes, wgs84
 from sarcl import scenario as scenarios
+from sarcl.scene import material_arguments
 
 ROOT = Path(sarcl.__file__).parent
 KINDS = {
@@ -168,7 +169,9 @@ CALLS = {
     "Antenna": (
         sarcl.Antenna, {"kind": "gaussian", "width": (0.1, 0.1)}, "kind width size taper azimuth elevation values mount"
     ),
-    "resolve": (material.resolve, {"material": "metal", "materials": None, "shape": (3,)}, "material materials"),
+    "resolve": (
+        material_arguments.resolve, {"material": "metal", "materials": None, "shape": (3,)}, "material materials"
+    ),
 }  # fmt: skip
 # refusals that name the argument by another word, as the reader of the message knows it
 ALSO = {

@@ -351,7 +351,7 @@ MAY_CATCH = {
     "io/orbit_files.py": "dates that do not exist",
     "model/_orbit_arguments.py": "numpy's shapes that do not fit together",
     "simulation/rcs/_rcs_task.py": "numpy's shapes that do not fit together",
-    "model/dates.py": "dates that do not exist",
+    "earth/dates.py": "dates that do not exist",
     "model/orbit.py": "the file is put before a message, which is raised again",
     "io/input_paths.py": "names that no system takes",
     "io/_gotcha.py": "scipy's reader of damaged files; the file is put before a message, which is raised again",

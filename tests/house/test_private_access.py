@@ -9,7 +9,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 TESTS = Path(__file__).parents[1]
-MOST_PRIVATE = 34  # files of tests/ that name a private file or a private name of the package
+MOST_PRIVATE = 30  # files of tests/ that name a private file or a private name of the package
 MOST_CONSTANTS = 5  # calls that replace a constant of the package
 PATCHERS = ("setattr", "patch", "object")  # of pytest's monkeypatch, and of unittest.mock
 

@@ -7,7 +7,8 @@ import pytest
 from scipy.integrate import quad
 
 import sarcl
-from sarcl.scene.material import DIAGRAMS, MATERIALS, METAL, Material, merge, resolve
+from sarcl.scene.material import DIAGRAMS, MATERIALS, METAL, Material
+from sarcl.scene.material_arguments import merge, resolve
 
 EPS0 = 8.8541878128e-12
 TOLERANCE = {"float64": 1e-12, "three figures": 5e-3}  # the table is written to three figures

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,15 @@ import sarcl
 from sarcl.numerics.tiles import tile_points
 from sarcl.scattering.rough_pieces import RoughFacets, RoughPieces
 from sarcl.scene import triangles as geometry
-from sarcl.simulation.facets._piece_tiling import PieceTiling
+from sarcl.simulation.echo_request import EchoLimits
+from sarcl.simulation.facets.facet_spreading import TiledFacets
+
+
+def tiled(device, pieces, **options):
+    """Tiling of pieces, at one frequency and pulse."""
+    request = SimpleNamespace(device=device, limits=EchoLimits(), polarizations=("HH",))
+    plan = SimpleNamespace(nodes=np.array([9.6e9]))
+    return TiledFacets(request, RoughFacets(pieces), plan, range(1), None, None, **options).tiling
 
 
 @pytest.mark.parametrize("per_tile", [64, 256])
@@ -20,10 +30,10 @@ def test_tiles_hold_their_pieces(double, per_tile):
     one = one + sarcl.Scene.facets(0.1 * np.eye(3)[None], material=cos)  # not cut
     one = one.moved((300.0, -2e3, 7.0))
     pieces = RoughPieces.cut(double, one, 0.4, 0, RoughPieces.suited(double, one))
-    tiling = PieceTiling(pieces, *RoughFacets(pieces).tiling_numbers(np.array([9.6e9]), True, False))
+    tiling = tiled(double, pieces)
     tiles = tiling.tiles(per_tile)
     assert tiling.tiles(per_tile) is tiles
-    brief = PieceTiling(pieces, *RoughFacets(pieces).tiling_numbers(np.array([9.6e9]), True, False), stays=False)
+    brief = tiled(double, pieces, stays=False)
     assert all((brief.radii[n] == tiling.radii[n]).all() for n in tiling.radii) and tiles.planes is tiles.planes
     for one, stays in ((tiles, True), (brief.tiles(per_tile), False)):
         planes = one.planes

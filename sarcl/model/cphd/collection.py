@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,31 +24,33 @@ STEPS, MET = 20, 1e-7  # iterations, and error in m, of the point at which refer
 SAME = 1.0  # m: farther from where the sender has moved on to, the receiver is on another platform
 
 
-def collection_of(
-    raw: PhaseHistory,
-    *,
-    origin: ArrayLike | None = None,
-    axes: ArrayLike | None = None,
-    metadata: Mapping[str, ArrayLike | np.datetime64] | None = None,
-    domain: Literal["FX", "TOA"] = "FX",
-    sgn: Literal[-1, 1] = -1,
-    version: Literal["1.0.1", "1.1.0"] = "1.1.0",
-) -> Collection:
-    """The arguments of `PhaseHistory.save` for CPHD, checked, and all that the file says."""
-    validation.choice("domain", domain, ("FX", "TOA"))
-    validation.choice("version", version, ("1.0.1", "1.1.0"))
-    if sgn not in (-1, 1) or isinstance(sgn, bool):
-        raise ValueError(f"sgn is {sgn!r}; give -1, or +1: then the samples are conjugated")
+class CphdOptions(NamedTuple):
+    """Arguments of `PhaseHistory.save` for CPHD, which has their defaults."""
+
+    origin: ArrayLike | None
+    axes: ArrayLike | None
+    metadata: Mapping[str, ArrayLike | np.datetime64] | None
+    domain: str
+    sgn: int
+    version: str
+
+
+def collection_of(raw: PhaseHistory, options: CphdOptions) -> Collection:
+    """All that the file of a phase history says; ValueError for options that CPHD does not have."""
+    validation.choice("domain", options.domain, ("FX", "TOA"))
+    validation.choice("version", options.version, ("1.0.1", "1.1.0"))
+    if options.sgn not in (-1, 1) or isinstance(options.sgn, bool):
+        raise ValueError(f"sgn is {options.sgn!r}; give -1, or +1: then the samples are conjugated")
     _check_samples(raw)
-    words = Words("CPHD", metadata, (*REQUIRED, *OPTIONAL, *OTHERS))
-    corner, local = frame(raw.tx[0], "CPHD", origin, axes)
+    words, is_local = Words("CPHD", options.metadata, (*REQUIRED, *OPTIONAL, *OTHERS)), options.origin is not None
+    corner, local = frame(raw.tx[0], "CPHD", options.origin, options.axes)
     time = per_row(raw, words, "time", "TxTime", ())
     velocities = [
         per_row(raw, words, name, key, (3,)) @ local
         for name, key in (("tx_velocity", "TxVel"), ("rx_velocity", "RcvVel"))
     ]
     tx, rx = (corner + positions @ local for positions in (raw.tx, raw.rx))
-    point = _reference_point(raw, words, corner, local, is_local=origin is not None)
+    point = _reference_point(raw, words, corner, local, is_local)
     early = max(0, int(np.ceil(-time.min())))  # whole seconds by which the file's clock starts before time 0
     start = words.start() - np.timedelta64(early, "s")
     names = {key: words.text(key) for key in REQUIRED} | {k: words.text(k) for k in OPTIONAL if k in words.values}
@@ -58,9 +60,9 @@ def collection_of(
     is_one = raw.is_monostatic or bool((moved < SAME).all())
     names.setdefault("CollectType", "MONOSTATIC" if is_one else "BISTATIC")
     validation.choice("metadata['CollectType']", names["CollectType"], ("MONOSTATIC", "BISTATIC"))
-    surface, area = _surface(raw, words, point, local, is_local=origin is not None)
+    surface, area = _surface(raw, words, point, local, is_local)
     return Collection(
-        channels=_channels(raw, words, time, version),
+        channels=_channels(raw, words, time, options.version),
         n_samples=raw.n_samples,
         frequency=raw.frequency,
         frequency_step=raw.frequency_step,
@@ -75,9 +77,9 @@ def collection_of(
         area=area,
         start=start,
         names=names,
-        domain=domain,
-        sgn=int(sgn),
-        version=version,
+        domain=options.domain,
+        sgn=int(options.sgn),
+        version=options.version,
     )
 
 

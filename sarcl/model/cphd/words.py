@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...base import validation, wgs84
-from ..dates import date
+from ...earth.dates import date
 
 if TYPE_CHECKING:
     from ..phase_history import PhaseHistory

@@ -18,7 +18,6 @@ RADAR = FarRadar(look=np.radians(50), bandwidth=100e6, turn=0.014, n_pulses=64)
 FINE = FarRadar(look=np.radians(50), bandwidth=150e6, turn=0.02, n_pulses=100)
 COTANGENT, TANGENT = 1 / np.tan(RADAR.look), np.tan(RADAR.look)
 LOOKS = {True: 6, False: 24}
-FIGURE = "figure 13"
 BOX = (14.0, 36.0, 14.0)  # m along x, y, z: depth, width, height
 POLARIZATIONS = ("HH", "VV", "HV")
 
