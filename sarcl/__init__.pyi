@@ -58,5 +58,6 @@ from .verbs import rcs as rcs
 from .verbs import spectral_echo as spectral_echo
 from .visibility import illumination as illumination
 
+from . import linear as linear  # isort: skip
 from . import papers as papers  # isort: skip
 from . import scenario as scenario  # isort: skip

@@ -235,7 +235,7 @@ def _direct(task: FocusingTask, tolerance: float, devices: DeviceClass, float64:
         best = reachable(lambda t: _confirmed(Float32Methods(task, t).direct(devices)), LEAST_TOLERANCE)
         limit, how = (GAINS, "with an antenna") if task.antenna is not None else ("float32", "without float64")
         return ToleranceUnreachable(tolerance, best, limit, _without_float64(task, float64), how)
-    return _float64(task, tolerance)
+    return in_float64(task, tolerance)
 
 
 def _without_float64(task: FocusingTask, float64: bool) -> str:
@@ -266,7 +266,7 @@ def _factorized(task: FocusingTask, tolerance: float, devices: DeviceClass, floa
     return candidate.restated(tolerance, best, remedy)
 
 
-def _float64(task: FocusingTask, tolerance: float) -> Candidate:
+def in_float64(task: FocusingTask, tolerance: float) -> Candidate:
     """The direct method in float64."""
     try:
         plan, tiling = float64_plan.make_plan(task, tolerance)

@@ -177,7 +177,7 @@ def make_task(
     antenna = antenna_of(raw, beam, center) if is_antenna(beam) else None
     toward, angle = beam_of(raw, None if antenna else beam, center)
     taper = None
-    if toward is not None and not _all_lit(geometry_of(raw, wrap, toward, angle), grid):
+    if toward is not None and not all_lit(geometry_of(raw, wrap, toward, angle), grid):
         across, along = windows.both(window)
         if along is not None:
             taper, window = windows.table(along), (across, None)
@@ -203,7 +203,7 @@ def make_task(
     )
 
 
-def _all_lit(antennas: PulseGeometry, grid: ImageGrid) -> bool:
+def all_lit(antennas: PulseGeometry, grid: ImageGrid) -> bool:
     """Whether every row sees the whole sphere about the grid."""
     low, high = grid.bounds
     middle, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2 * (1 + 1e-9)

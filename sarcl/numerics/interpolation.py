@@ -238,9 +238,9 @@ def _largest_error(table: np.ndarray, nu: np.ndarray, transform: np.ndarray) -> 
 
 
 @functools.cache
-def _gauss() -> tuple[np.ndarray, np.ndarray]:
-    """Nodes and weights of Gauss-Legendre quadrature over [-1/2, 1/2]."""
-    nodes, weights = np.polynomial.legendre.leggauss(12)
+def _gauss(n: int) -> tuple[np.ndarray, np.ndarray]:
+    """n nodes and weights of Gauss-Legendre quadrature over [-1/2, 1/2]."""
+    nodes, weights = np.polynomial.legendre.leggauss(n)
     return nodes / 2, weights / 2
 
 
@@ -249,7 +249,7 @@ def _transform(table: np.ndarray, nu: np.ndarray) -> np.ndarray:
     nu = np.asarray(nu, np.float64)
     if len(table) == 1:
         return np.sinc(nu) ** 2
-    z, gauss = _gauss()
+    z, gauss = _gauss(12 if np.abs(nu).max(initial=0.0) <= 1 else 24)
     kernel = _weights(table, z) * gauss[:, None]
     taps = 2 * len(table)
     distance = z[:, None] + (taps - 1) / 2 - np.arange(taps)

@@ -98,4 +98,4 @@ def to_samples(device: Device, profiles: np.ndarray, n_samples: int, interpolato
     low = n_samples // 2
     # conjugate grids: the sign that centres delay 0 is its own inverse
     samples = np.concatenate([spectrum[:, length - low :], spectrum[:, : n_samples - low]], axis=1)
-    return samples * correction(interpolator, n_samples, length).astype(np.float32)
+    return samples * correction(interpolator, n_samples, length).astype(profiles.real.dtype)

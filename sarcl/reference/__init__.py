@@ -17,6 +17,7 @@ For other folders:
     geometry       half the two-way path less the reference range
     image          multilooking
     interp         interpolation of one profile
+    linear         the echo of points as a matrix
     lit_part       the part of a facet that is in no shadow
     map_drift      correlation and displacement of two looks along the track
     merge          profiles about a tile's centre, and their decimation

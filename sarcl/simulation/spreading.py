@@ -212,6 +212,13 @@ class HostTiling:
             )  # fmt: skip
         return device_tiles
 
+    def refill(self, planes: Callable[[np.ndarray], np.ndarray]) -> None:
+        """Give the scatterers other numbers; tiles that are on the device stay."""
+        self._planes = planes
+        if self._on_device is not None:
+            on_device = self.device.upload(planes(self._on_device.order))
+            self._on_device = replace(self._on_device, planes=on_device)
+
     def _tiled(self, per_tile: int) -> tuple[Tiles, np.ndarray]:
         return tile_points(self.positions, self.center, per_tile, self.order)
 

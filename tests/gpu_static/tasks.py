@@ -128,6 +128,15 @@ def rays() -> Any:
     return scene.nearest(-ends, ends), scene.any_hit(-ends, ends)
 
 
+def exact_operator(n_rows: int = 8) -> Any:
+    """The transpose of float64 images, and gradients by everything that moves, of one antenna."""
+    noise = np.ones((n_rows, 32), np.complex64)
+    tx = np.array([-7e3, 0, 7e3]) + np.arange(n_rows)[:, None]
+    raw = sarcl.PhaseHistory(noise, 9.5e9, 6e6, tx, np.linalg.norm(tx, axis=1))
+    operator = sarcl.linear.Echoes(sarcl.ImageGrid.plane(shape=(16, 16), spacing=0.2), raw, exact=True)
+    return operator.gradients(operator.H @ noise.ravel(), noise.ravel())
+
+
 OWN: dict[str, Callable[[], Any]] = {
     **{f"shares {place}": partial(shares, place) for place in ("outside", "near")},
     **{
@@ -135,6 +144,7 @@ OWN: dict[str, Callable[[], Any]] = {
         for listed, name in itertools.product((False, True), ("1e-3", "3e-5"))
     },
     "rays": rays,
+    "operator": exact_operator,
     "range_doppler": lambda: range_doppler(1e-2),
     "spectral_echo": lambda: spectral(1e-2),
     "spectral_echo rough": lambda: spectral(1e-2, roughness=0.01),

@@ -15,8 +15,8 @@ import sarcl
 
 PACKAGE = Path(sarcl.__file__).parent
 MODULES = (
-    "array_factor", "fda", "illumination", "material", "motion", "noise", "papers", "pointing", "progress", "radar",
-    "scenario", "shapes", "stop_and_go", "wgs84",
+    "array_factor", "fda", "illumination", "linear", "material", "motion", "noise", "papers", "pointing", "progress",
+    "radar", "scenario", "shapes", "stop_and_go", "wgs84",
 )  # fmt: skip
 
 

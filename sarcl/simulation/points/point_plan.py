@@ -34,10 +34,12 @@ class PointPlan:
 
     direct      points that are added at each pulse, and their plan;  factorized  cells of points that every pulse sees,
                 their numbers among all points, and their plan. None: there are none
+    numbers     of the points that are added at each pulse; None: all
     """
 
     direct: tuple[TiledScatterers, Plan] | None
     factorized: tuple[ScattererCells, np.ndarray, FactorizedPlan] | None = None
+    numbers: np.ndarray | None = None
 
     @property
     def plans(self) -> list[Plan | FactorizedPlan]:
@@ -188,8 +190,9 @@ class PreparedPoints:
             return plan
         if numbers is None:
             return PointPlan(None, (cells, cells.order, plan))
-        rest = self._tiled(self._cells.order[~seen])
-        return PointPlan((rest, rest.plan(antennas, band, tolerance)), (cells, numbers[cells.order], plan))
+        others = self._cells.order[~seen]
+        rest = self._tiled(others)
+        return PointPlan((rest, rest.plan(antennas, band, tolerance)), (cells, numbers[cells.order], plan), others)
 
     @functools.cached_property
     def _cells(self) -> ScattererCells:

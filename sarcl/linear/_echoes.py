@@ -1,0 +1,337 @@
+"""Echoes: the echo of points as a linear operator of their amplitudes, and its adjoint."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Literal, NoReturn
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.sparse.linalg import LinearOperator
+
+from ..base.validation import choice, converted, count, finite, number
+from ..imaging.antenna_beam import AntennaBeam
+from ..imaging.backproject_options import BackprojectOptions
+from ..imaging.focusing_task import BeamCone
+from ..model.phase_history import PhaseHistory
+from ..model.waveform import Waveform
+from ..numerics.plan import LEAST_TOLERANCE
+from ..numerics.windows import Window
+from ..opencl.choose_device import open_device
+from ..opencl.device import DeviceChoice
+from ..opencl.memory_budget import budget
+from ._autograd import jax_function, rows_of_batch, torch_batch, torch_function
+from ._float32_pair import Image, PointEchoes
+from ._float64_pair import TransposedImage, choice_of
+from ._gradients import KINDS, Gradients, Kind
+from ._measurement import Arguments, Domain, measurement_of
+
+MOST_ROUNDS = 200  # of the power iteration
+
+
+class _Named(LinearOperator):
+    """A LinearOperator whose errors of shape name what was given, and both shapes.
+
+    domain  what a vector that it takes has a number for, in words
+    """
+
+    domain = "pixel"
+
+    def dot(self, x: ArrayLike) -> np.ndarray:
+        """self @ x of a vector (n,) or of columns (n, k)."""
+        x = np.asarray(x)
+        if x.ndim not in (1, 2) or x.shape[0] != self.shape[1]:
+            raise ValueError(
+                f"x has shape {x.shape}, and the operator {self.shape}: give one number for each {self.domain}, "
+                f"({self.shape[1]},), or columns of them, ({self.shape[1]}, k)"
+            )
+        return np.asarray(self.matvec(x) if x.ndim == 1 else self.matmat(x))
+
+    def __matmul__(self, x: ArrayLike) -> np.ndarray:
+        return super().__matmul__(x) if isinstance(x, LinearOperator) else self.dot(x)
+
+
+class _Adjoint(_Named):
+    """The adjoint of Echoes."""
+
+    domain = "sample"
+
+    def __init__(self, of: Echoes) -> None:
+        super().__init__(of.dtype, (of.shape[1], of.shape[0]))
+        self._of = of
+
+    def _matvec(self, y: np.ndarray) -> np.ndarray:
+        return self._of._rmatvec(y)
+
+    def _rmatvec(self, x: np.ndarray) -> np.ndarray:
+        return self._of._matvec(x)
+
+    def _adjoint(self) -> Echoes:
+        return self._of
+
+
+class Echoes(_Named):
+    """Echoes of points as a linear operator A of their amplitudes; A.H is the image of samples.
+
+        (A x)_pn = w_p w_n W(f_pn) sum_k v_p(x_k) g_p(x_k) x_k exp(-j 2 pi f_pn (tau_k(p) - tau_ref(p)))
+
+    domain     the points: an ImageGrid, or positions, m (n, 3)
+    like       PhaseHistory whose positions, frequencies, reference ranges, channels and `weight` the rows have; its
+               samples are not read
+    tolerance  bound of the L2 error of A @ x, for amplitudes of random phases or equal ones, and of A.H @ y, for
+               samples whose energy lies in the ranges of the points; relative as in `sarcl.backproject`
+    exact      True: A.H is the adjoint of the very A that is computed, to rounding: both in float64, by the same
+               interpolation weights and phases. False: each direction is the cheapest plan of `echo` or `backproject`
+    method     "auto", "direct" or "factorized", as of `sarcl.echo` and `sarcl.backproject`; exact=True is direct
+    waveform   W is its matched spectrum; None: that of like.waveform, or 1
+    weights    w_p, one per row (n_rows,);  window  over samples and rows, as of `sarcl.backproject`
+    antenna    g_p: an Antenna, or (Antenna, aim), as beam= of `sarcl.backproject`: gains at the centre of the band
+    beam       the cone in which v_p is 1: its angle, rad, or (angle, direction), as of `sarcl.backproject`
+    wrap       False: v_p is 1 for |tau - tau_ref| <= 1/(2 frequency_step) alone
+    device     see `sarcl.devices`;  max_bytes  memory for blocks, as of `sarcl.backproject`
+
+    A has shape (rows times samples, points): samples are raw.samples.ravel(), amplitudes image.data.ravel(). It is
+    planned once; `predicted_error` is the larger one of both directions. Data are complex64, and complex128 for
+    tolerances below 1e-6; with exact=True also where the input is. Threads may share an operator: they take turns.
+
+    TypeError, ValueError: arguments that do not fit, naming them. ToleranceUnreachable, a ValueError: the tolerance
+    cannot be met. An operator cannot be pickled, and a process that was forked cannot use it: make it there.
+    Source: Farooq 2009, sections 2.2.2 and 2.3; docs/theory/linear.md.
+    """
+
+    def __init__(
+        self,
+        domain: Domain,
+        like: PhaseHistory,
+        *,
+        tolerance: float = 1e-3,
+        exact: bool = False,
+        method: Literal["auto", "direct", "factorized"] = "auto",
+        waveform: Waveform | None = None,
+        weights: ArrayLike | None = None,
+        antenna: AntennaBeam | None = None,
+        beam: BeamCone | None = None,
+        window: Window | None = None,
+        wrap: bool = False,
+        device: DeviceChoice | None = None,
+        max_bytes: float | None = None,
+    ) -> None:
+        arguments = Arguments(
+            tolerance, exact, method, waveform, weights, antenna, beam, window, wrap, device, max_bytes
+        )
+        self._prepare(domain, like, arguments, None)
+
+    def _prepare(self, domain: Domain, like: PhaseHistory, arguments: Arguments, known: TransposedImage | None) -> None:
+        """Plan; in float64 as a known pair, where that plan holds."""
+        self._domain, self._like, self._arguments = domain, like, arguments
+        self.tolerance, self.exact = float(arguments.tolerance), bool(arguments.exact)
+        self._device, self._lock = open_device(arguments.device), threading.RLock()
+        self._measurement = measurement = measurement_of(domain, like, arguments)
+        self._available = budget(self._device, arguments.max_bytes)
+        self._gradients: Gradients | None = None
+        options = BackprojectOptions(
+            tolerance=self.tolerance, method=arguments.method, device=self._device, max_bytes=arguments.max_bytes
+        )
+        self._forward: PointEchoes | TransposedImage
+        if self.exact or self.tolerance < LEAST_TOLERANCE or measurement.is_cut:
+            self._forward = self._float64_pair(arguments.method, known)
+            chosen = self._forward.choice
+        else:
+            chosen = options.choose(measurement.task, [self._device])
+            self._forward = PointEchoes(self._device, measurement, self.tolerance, arguments.method, self._available)
+        self._pair = self._forward if isinstance(self._forward, TransposedImage) else None
+        self._image = Image(options, measurement, chosen)
+        self.predicted_error = max(self._forward.predicted_error, chosen.predicted_error)
+        dtype = np.complex128 if self.tolerance < LEAST_TOLERANCE else np.complex64
+        rows, samples = measurement.shape
+        super().__init__(dtype, (rows * samples, measurement.task.grid.size))
+
+    def normal(self, x: ArrayLike) -> np.ndarray:
+        """A.H @ A @ x of amplitudes (n,). The samples are in memory meanwhile."""
+        return np.asarray(self.H @ (self @ x))
+
+    def norm(self, tolerance: float = 1e-3, seed: int = 0) -> float:
+        """The largest singular value, by power iteration from random amplitudes; a lower bound.
+
+        Changes from round to round shrink by a ratio: iterations stop where the rest of that series is below
+        `tolerance`, at most after 200.
+        """
+        least = number("tolerance", tolerance, above=0)
+        random = np.random.default_rng(count("seed", seed, 0))
+        x = random.standard_normal(self.shape[1]) + 1j * random.standard_normal(self.shape[1])
+        value, change = 0.0, np.inf
+        for _ in range(MOST_ROUNDS):
+            y = self @ (x / np.linalg.norm(x)).astype(self.dtype)
+            before, value = value, float(np.linalg.norm(y))
+            earlier, change = change, abs(value - before)
+            rest = change**2 / (earlier - change) if change < earlier < np.inf else np.inf
+            if rest <= least * value or value == 0:
+                break
+            x = self.H @ y
+        return value
+
+    def gradients(self, x: ArrayLike, y: ArrayLike, of: Kind | Sequence[Kind] | None = None) -> dict[str, np.ndarray]:
+        """Gradients of Re <y, A x>, <y, z> = sum conj(y) z: the derivatives with respect to each kind of parameter.
+
+        x, y  amplitudes (n,) and samples (rows times samples,)
+        of    kinds, None: all. "amplitudes": complex (n,), A.H y, of which Re <A.H y, dx> is the change. "positions"
+              of points, per m (n, 3). "heights", along the normal of a plane or the vertical, per m (n,). "tx", "rx",
+              per m (n_rows, 3): where like has one antenna both move with "tx", and "rx" is refused.
+              "reference_range", per m, and "phase", of samples times exp(j phase), per rad (n_rows,)
+
+        All but "amplitudes" are float64 and computed in float64, within about the tolerance of their norms at random
+        phases. What range windows, beams and windows over the aperture cut does not move. ValueError: unknown kinds, an
+        antenna, whose gains move, a device without float64.
+        """
+        is_one_antenna = self._like.rx is self._like.tx
+        if of is None:
+            of = [kind for kind in KINDS if kind != "rx" or not is_one_antenna]
+        kinds: list[Kind] = [of] if isinstance(of, str) else [*of]
+        for kind in kinds:
+            choice("of", kind, KINDS)
+        x, y = (self._vector(name, value, n) for name, value, n in (("x", x, 1), ("y", y, 0)))
+        out = {"amplitudes": self.H @ y} if "amplitudes" in kinds else {}
+        if [kind for kind in kinds if kind != "amplitudes"]:
+            if "rx" in kinds and is_one_antenna:
+                raise ValueError(
+                    'of has "rx", but like has one antenna: ask for "tx", or make it with rx=raw.rx.copy()'
+                )
+            with self._lock:
+                if self._gradients is None:
+                    pair = self._pair or self._float64_pair()
+                    self._gradients = Gradients(pair, self._measurement, self._available)
+                out |= self._gradients.of(x, y.reshape(self._measurement.shape), kinds)
+        return {kind: out[kind] for kind in kinds}
+
+    def at(
+        self,
+        *,
+        positions: ArrayLike | None = None,
+        tx: ArrayLike | None = None,
+        rx: ArrayLike | None = None,
+        reference_range: ArrayLike | None = None,
+    ) -> Echoes:
+        """The operator at other positions of points, m (n, 3), or antennas, m (n_rows, 3), or reference ranges, m.
+
+        Other arguments are as they were. In float64 the plan is kept as long as it meets the tolerance, else, and in
+        float32, it is planned for the new geometry.
+        """
+        like = self._like
+        if tx is not None:
+            like = replace(like, tx=converted("tx", tx, np.float64))
+        if rx is not None:
+            like = replace(like, rx=converted("rx", rx, np.float64))
+        if reference_range is not None:
+            like = replace(like, reference_range=converted("reference_range", reference_range, np.float64))
+        moved = Echoes.__new__(Echoes)
+        moved._prepare(self._domain if positions is None else positions, like, self._arguments, self._pair)
+        return moved
+
+    def torch(self) -> Callable[..., object]:
+        """f(x, positions=None, tx=None, rx=None, reference_range=None, phase=None) of tensors, for PyTorch's autograd.
+
+        It gives samples (rows times samples,), each row times exp(j phase). At other positions it is `at`, in each
+        call. Real values have real gradients. It is differentiated once. ImportError: pip install 'sarcl[torch]'.
+        """
+        return torch_function(self)
+
+    def jax(self) -> Callable[..., object]:
+        """As `torch`, of JAX arrays, with a custom_vjp that calls the host. ImportError: pip install 'sarcl[jax]'."""
+        return jax_function(self)
+
+    @property
+    def n_rows(self) -> int:
+        """Rows of samples."""
+        return self._measurement.shape[0]
+
+    def result_type(self, kind: np.dtype[np.generic]) -> np.dtype[np.complexfloating]:
+        """Data type of results of input of a type: complex64 or complex128."""
+        double = self.dtype == np.complex128 or (self.exact and np.result_type(kind, np.complex64) == np.complex128)
+        return np.dtype(np.complex128 if double else np.complex64)
+
+    def _float64_pair(self, method: str = "auto", known: TransposedImage | None = None) -> TransposedImage:
+        """A pair in float64 with the tolerance; its plan is that of a known pair, where that holds."""
+        if self._measurement.task.antenna is not None:
+            raise ValueError(
+                "antenna= needs gains, which are computed in float32: leave out exact=True and gradients, take a "
+                "tolerance of 1e-6 or more, and no beam= or window over the aperture with other weights in each pixel"
+            )
+        if method == "factorized":
+            raise ValueError("method='factorized' is not possible in float64, which exact=True asks for: take 'auto'")
+        chosen = choice_of(self._measurement, self.tolerance, known)
+        return TransposedImage(self._device, self._measurement, chosen, self._available)
+
+    def _vector(self, name: str, values: ArrayLike, axis: int) -> np.ndarray:
+        """Finite values, complex128, of as many elements as an axis of the operator has."""
+        array = converted(name, values, np.complex128)
+        if array.shape != (self.shape[axis],):
+            raise ValueError(
+                f"{name} has shape {array.shape}, wanted ({self.shape[axis]},), as the operator {self.shape}"
+            )
+        finite(name, array)
+        open_device(self._device)  # refused in a process that was forked
+        return array
+
+    def A(self, x: ArrayLike) -> np.ndarray:
+        """Samples (..., n_rows, n_samples) of images (..., *shape of the domain): the forward operator of deepinv.
+
+        Tensors of PyTorch give tensors, which are differentiated.
+        """
+        return self._of_batch(self, x, self._measurement.task.grid.shape, self._measurement.shape)
+
+    def A_adjoint(self, y: ArrayLike) -> np.ndarray:
+        """Images (..., *shape of the domain) of samples (..., n_rows, n_samples): the adjoint operator of deepinv.
+
+        Tensors of PyTorch give tensors, which are differentiated.
+        """
+        return self._of_batch(self.H, y, self._measurement.shape, self._measurement.task.grid.shape)
+
+    @staticmethod
+    def _of_batch(operator: LinearOperator, x: ArrayLike, inside: tuple[int, ...], out: tuple[int, ...]) -> np.ndarray:
+        if hasattr(x, "detach"):
+            return torch_batch(operator, x, inside, out)
+        array = np.asarray(x)
+        vectors, shape = rows_of_batch(array, inside, out)
+        return np.stack([operator @ one for one in vectors]).reshape(shape)
+
+    def _matvec(self, x: np.ndarray) -> np.ndarray:
+        measurement = self._measurement
+
+        def samples(amplitudes: np.ndarray) -> np.ndarray:
+            return measurement.weighted(self._forward(amplitudes)).ravel()
+
+        return self._applied("x", samples, x.ravel())
+
+    def _rmatvec(self, y: np.ndarray) -> np.ndarray:
+        measurement = self._measurement
+
+        def pixels(samples: np.ndarray) -> np.ndarray:
+            return self._image(measurement.weighted(samples.reshape(measurement.shape)))
+
+        return self._applied("y", pixels, y.ravel())
+
+    def _applied(self, name: str, apply: Callable[[np.ndarray], np.ndarray], values: np.ndarray) -> np.ndarray:
+        """`apply` to finite values (n,) of any size: scaled by a power of two, and the result scaled back."""
+        out = self.result_type(values.dtype)
+        values = converted(name, values, out)
+        finite(name, values)
+        open_device(self._device)  # refused in a process that was forked
+        numbers = values.view(values.real.dtype)
+        largest = float(np.abs(numbers).max(initial=0.0))
+        exponent = np.frexp(largest)[1]
+        scaled = np.ldexp(numbers, -exponent).view(values.dtype)
+        with self._lock:
+            result = np.array(apply(scaled), order="C")
+        parts = result.view(result.real.dtype)
+        return np.ldexp(parts, exponent).view(result.dtype).astype(out)
+
+    def _adjoint(self) -> _Adjoint:
+        return _Adjoint(self)
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError(
+            "sarcl.linear.Echoes holds memory of a device and cannot be pickled or copied; make it in the process that "
+            "uses it"
+        )

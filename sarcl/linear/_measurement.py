@@ -1,0 +1,144 @@
+"""The rows, weights and pixels that the operator and its adjoint share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..base import validation
+from ..base.validation import instance
+from ..imaging.antenna_beam import AntennaBeam, antenna_of, is_antenna
+from ..imaging.choose_method import METHODS
+from ..imaging.focusing_task import BeamCone, FocusingTask, Skip, all_lit, geometry_of, make_task
+from ..model.image_grid import ImageGrid
+from ..model.phase_history import PhaseHistory
+from ..model.waveform import Waveform
+from ..numerics.windows import Window
+from ..opencl.device import DeviceChoice
+
+Domain: TypeAlias = ImageGrid | ArrayLike
+SKIPS: tuple[Skip, ...] = (
+    "range window",
+    "beam",
+    "no data",
+)  # all reasons to leave pairs out but weights of 0: rows keep their places
+
+
+class Samples:
+    """Samples of a PhaseHistory that are exchanged from one application to the next: `array` (n_rows, n_samples)."""
+
+    def __init__(self, array: np.ndarray) -> None:
+        self.array, self.shape = array, array.shape
+
+    @property
+    def dtype(self) -> np.dtype[np.complexfloating]:
+        """Data type of the samples as they are now."""
+        return self.array.dtype
+
+    def __getitem__(self, rows: slice) -> np.ndarray:
+        return np.asarray(self.array[rows])
+
+
+@dataclass(frozen=True, eq=False)
+class Measurement:
+    """What is measured of the pixels: s_pn = m_pn sum_x v_p(x) a(x) exp(-j 2 pi f_pn (tau - tau_ref)).
+
+    task     geometry, pixels, range window and beam, taper and antenna, with weights of 1 in rows and samples
+    samples  of task.raw
+    rows     (n_rows, 1) float64, and  band  float64 (1, n_samples) or (n_rows, n_samples): m = rows times band, the
+             weights of rows, and those of samples times the spectrum of the waveform
+    seen     pixels, flat, that have a position (n,) int; None: all
+    """
+
+    task: FocusingTask
+    samples: Samples
+    rows: np.ndarray
+    band: np.ndarray
+    seen: np.ndarray | None
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows of samples, and samples of a row."""
+        return self.task.raw.n_rows, self.task.raw.n_samples
+
+    @property
+    def positions(self) -> np.ndarray:
+        """Positions of the pixels that are seen, m (n, 3)."""
+        positions = self.task.grid.positions.reshape(-1, 3)
+        return positions if self.seen is None else positions[self.seen]
+
+    @property
+    def is_cut(self) -> bool:
+        """Whether a beam leaves out pixels of some rows, or a window has another weight in each pixel."""
+        return self.task.antennas.beam is not None or self.task.taper is not None
+
+    def weighted(self, samples: np.ndarray) -> np.ndarray:
+        """Samples (n_rows, n_samples) times m, of their type."""
+        out = samples * self.rows.astype(samples.real.dtype)
+        out *= self.band
+        return np.asarray(out)
+
+
+@dataclass(frozen=True, eq=False)
+class Arguments:
+    """Options of `Echoes`, as it takes them; checked where they are used, or here."""
+
+    tolerance: float
+    exact: bool
+    method: Literal["auto", "direct", "factorized"]
+    waveform: Waveform | None
+    weights: ArrayLike | None
+    antenna: AntennaBeam | None
+    beam: BeamCone | None
+    window: Window | None
+    wrap: bool
+    device: DeviceChoice | None
+    max_bytes: float | None
+
+    def __post_init__(self) -> None:
+        validation.tolerance(self.tolerance)
+        validation.flag("exact", self.exact)
+        validation.flag("wrap", self.wrap)
+        validation.choice("method", self.method, METHODS)
+
+
+def measurement_of(domain: Domain, like: PhaseHistory, arguments: Arguments) -> Measurement:
+    """The measurement for the arguments of `Echoes`; ValueError or TypeError for arguments that do not fit."""
+    antenna, beam, wrap = arguments.antenna, arguments.beam, bool(arguments.wrap)
+    instance("like", like, PhaseHistory)
+    grid = domain if isinstance(domain, ImageGrid) else ImageGrid.points(domain)
+    if is_antenna(beam):
+        raise TypeError("beam is an Antenna; give it as antenna=, and the angle of a cone as beam=")
+    noise = (
+        np.random.default_rng(0).standard_normal((*np.shape(like.samples), 2), np.float32).view(np.complex64)[..., 0]
+    )
+    samples = Samples(noise)
+    raw = replace(like, samples=samples, report=None)
+    task = make_task(raw, grid, arguments.window, arguments.weights, wrap, SKIPS, beam, sum_polarizations=True)
+    rows, across = task.row_weight, task.sample_weight
+    task = replace(task, row_weight=np.ones_like(rows), sample_weight=np.ones_like(across))
+    if task.antennas.beam is not None and all_lit(task.antennas, grid):
+        task = replace(task, antennas=geometry_of(raw, wrap))
+    if antenna is not None:
+        if not is_antenna(antenna):
+            raise TypeError(f"antenna is a {type(antenna).__name__}; give an Antenna, or (antenna, aim)")
+        center = grid.bounds.mean(axis=0) if grid.center is None else grid.center
+        task = replace(task, antenna=antenna_of(raw, antenna, center))
+    pulse = like.waveform if arguments.waveform is None else arguments.waveform
+    band = across[None]
+    if pulse is not None:
+        instance("waveform", pulse, Waveform)
+        axes = np.stack([raw.frequency, raw.frequency_step], axis=1)
+        if (axes == axes[0]).all():
+            axes = axes[:1]
+        frequencies = axes[:, :1] + np.arange(raw.n_samples) * axes[:, 1:]
+        band = band * pulse.matched_spectrum(frequencies.ravel()).reshape(frequencies.shape)
+    if not band.any():
+        raise ValueError("the spectrum of waveform is 0 at all frequencies of like; give its own waveform")
+    seen = None if grid.empty is None else np.flatnonzero(~grid.empty.ravel())
+    measurement = Measurement(task, samples, rows[:, None], band, seen)
+    samples.array = measurement.weighted(noise)
+    return measurement
