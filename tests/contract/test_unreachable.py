@@ -347,6 +347,7 @@ MAY_CATCH = {
     "base/host_memory.py": "a system that does not say its memory",
     "cli/_methods.py": "text of a command line: a number, or the name of a file",
     "earth/elevation.py": "numpy's shapes that do not fit together; the file is put before a message",
+    "earth/map_projection.py": "what pyproj says of a reference system",
     "earth/two_line.py": "text that is no number",
     "io/orbit_files.py": "dates that do not exist",
     "model/_orbit_arguments.py": "numpy's shapes that do not fit together",

@@ -39,6 +39,7 @@ def test_speckle_tells_rayleigh_amplitudes_from_others():
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:point_roughness moves posts:sarcl.SarclWarning")  # four facets a pixel, as in print
 def test_the_command_writes_a_page_on_which_all_but_the_errata_agree(tmp_path):
     assert parser.main(["papers", "saras", "--quick", "-o", str(tmp_path)]) == 0
     document = json.loads((tmp_path / "saras.json").read_text())
