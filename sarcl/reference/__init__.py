@@ -26,6 +26,7 @@ For other folders:
     quality        a point response by brute force
     range_doppler  reading of a profile along the range migration
     rays           the first facet on a ray, and whether any lies between two points
+    sheet_echo     echoes past and through thin sheets, by small pieces and rays
     shadow         which samples of facets are hidden
     spectral_echo  spectrum of a reflectivity map, and the steps of its grid
     transposition  what comes before and after an FFT of columns
