@@ -51,11 +51,14 @@ SCENES = {
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_from_far_away_echoes_are_those_of_rcs(name):
-    scene = SCENES[name]
-    samples, frequencies, report = echo(scene, FAR * towards(AZIMUTH, ELEVATION), check=True)
-    s = sarcl.rcs(scene, AZIMUTH, ELEVATION, frequencies, polarization=NAMES).swapaxes(1, 2)
-    all_seen = sarcl.rcs(scene, AZIMUTH, ELEVATION, frequencies, polarization=NAMES, shadows=False).swapaxes(1, 2)
+@pytest.mark.parametrize("receiver", [None, (-0.5, 1.0)], ids=["one antenna", "two"])
+def test_from_far_away_echoes_are_those_of_rcs(name, receiver):
+    scene, options, hears = SCENES[name], {"polarization": NAMES, "receiver": receiver}, None
+    if receiver is not None:
+        hears = sarcl.Trajectory(None, FAR * towards(*(np.full(len(AZIMUTH), angle) for angle in receiver)))
+    samples, frequencies, report = echo(scene, FAR * towards(AZIMUTH, ELEVATION), receiver=hears, check=True)
+    s = sarcl.rcs(scene, AZIMUTH, ELEVATION, frequencies, **options).swapaxes(1, 2)
+    all_seen = sarcl.rcs(scene, AZIMUTH, ELEVATION, frequencies, shadows=False, **options).swapaxes(1, 2)
     assert np.linalg.norm(s - all_seen) > 0.02 * np.linalg.norm(s)
     assert np.linalg.norm(samples - s) < 1e-3 * np.linalg.norm(s)
     assert report.measured_error < 1e-6
@@ -72,6 +75,20 @@ def test_a_plate_behind_a_parallel_slab_is_seen_through_it_twice():
             expected, behind = alone[p, column] * through**2, (both - front)[p, column]
             assert 20 * np.log10(np.linalg.norm(behind) / np.linalg.norm(expected)) == pytest.approx(0, abs=GATE)
             assert np.linalg.norm(behind - expected) < 1e-3 * np.linalg.norm(expected) + 1e-6 * np.linalg.norm(front[p])
+
+
+def test_a_receiver_elsewhere_sees_through_a_slab_at_its_own_angle():
+    """Transmitter and receiver at different angles in one plane: T(in) T(out), of H and of V."""
+    away = np.radians([10.0, 30.0, 50.0])
+    track, back = (FAR * towards(np.zeros(3), np.pi / 2 - angle) for angle in (away, -away[::-1] / 2))
+    plate, hears = shapes.plate((0.1, 0.1), position=(0, 0, -1.0)), sarcl.Trajectory(None, back)
+    both, front, alone = (echo(scene, track, receiver=hears) for scene in (SHEET + plate, SHEET, plate))
+    for p in range(3):
+        sent, returned = passed(both[1], away[p]), passed(both[1], away[::-1][p] / 2)
+        for column in range(2):
+            expected, behind = alone[0][p, column] * sent[column] * returned[column], (both[0] - front[0])[p, column]
+            near = 1e-3 * np.linalg.norm(expected) + 1e-6 * np.linalg.norm(front[0][p])
+            assert np.linalg.norm(behind - expected) < near
 
 
 NEAR, TWO = np.array([[6.0, 0.0, 20.0]]), ("HH", "VV")
