@@ -7,7 +7,7 @@ import pytest
 
 import sarcl
 from sarcl import shapes
-from sarcl.reference.sheet_echo import film
+from sarcl.reference.facet import film
 
 EPS, THICKNESS, CENTER = 3.0, 0.01, 5e9  # relative permittivity, m, Hz
 GLASS = sarcl.Material(EPS, thickness=THICKNESS)

@@ -1,4 +1,4 @@
-"""Echoes past and through thin sheets against small pieces, each with a ray to each antenna (reference.sheet_echo)."""
+"""Echoes past and through thin sheets against small pieces, each with a ray to each antenna (reference.facet)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 
 import sarcl
 from sarcl import shapes
-from sarcl.reference.sheet_echo import sheet_echo
+from sarcl.reference.facet import sheet_echo
 
 CHIRP = sarcl.Waveform.chirp(center=5e9, bandwidth=100e6, duration=1e-6)
 NAMES = ("HH", "HV", "VH", "VV")
