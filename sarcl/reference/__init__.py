@@ -11,7 +11,7 @@ For other folders:
     certain_shadows  shadows that miss a facet, or cover it, whatever antenna of several casts them
     edges          echoes of edges by short elements
     equations      delay, echo, matched filter, image, array, full-wave updates, waveform forming: in a textbook's order
-    facet          echo of triangular facets by physical optics
+    facet          echo of triangular facets by physical optics; past and through thin sheets, by small pieces and rays
     facet_pieces   pieces of rough facets, and their random numbers
     fdtd           layers, bodies and incident waves of a Yee grid
     geometry       half the two-way path less the reference range

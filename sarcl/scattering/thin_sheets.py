@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 
@@ -21,10 +21,15 @@ from .facets import POLARIZATIONS, FacetSet, Light
 from .mesh_quality.facet_groups import coplanar_groups
 from .physical_optics import UP, polarisation, slab, triangle_mean
 
-MOST = 4  # sheets: the parts seen through each set of them need 2^MOST computations of lit parts
+# Sheets, of one antenna and of two: the parts seen through each set of them, on each way, need 2^4 and 2^6 computations
+# of lit parts
+MOST = 4, 3
 # angles of incidence at which the change of T is looked at, and rad beyond those of centroids
 ANGLES, BEYOND = 256, 0.01
 FAINT = 0.1  # |T|, as near grazing incidence, below which errors of T are relative to this
+
+
+Ways = tuple[frozenset[int], ...]  # sheets that are passed on the way to the antenna, or to each of two
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,14 +44,19 @@ class ThinSheets:
     group: np.ndarray
 
     @classmethod
-    def of(cls, scene: Scene, antennas: list[np.ndarray]) -> ThinSheets:
-        """The sheets of a scene. NotApplicable for more than MOST, and for two antennas."""
+    def of(cls, scene: Scene, antennas: list[np.ndarray], *, forward: bool = False) -> ThinSheets:
+        """The sheets of a scene. NotApplicable for more than MOST, and for forward scatter to a second antenna."""
         rows = np.flatnonzero(scene.sheets)
         sheets = cls(scene, rows, coplanar_groups(scene, rows, np.zeros(len(rows), bool)))
-        if len(antennas) > 1 or len(sheets) > MOST:
+        if len(sheets) > MOST[len(antennas) - 1]:
             raise NotApplicable(
-                f"the scene has {len(sheets)} thin sheets; what lies behind them is computed for up to {MOST}, and for "
-                "one antenna: give shadows=False where nothing lies behind them"
+                f"the scene has {len(sheets)} thin sheets; what lies behind them is computed for up to {MOST[0]}, and "
+                f"for up to {MOST[1]} with a receiver elsewhere: give shadows=False where nothing lies behind them"
+            )
+        if forward and len(antennas) > 1:
+            raise NotApplicable(
+                "what lies behind thin sheets (a material with a thickness) is not computed with forward=True: leave "
+                "it out, or give shadows=False where nothing lies behind them"
             )
         return sheets
 
@@ -79,14 +89,17 @@ class ThinSheets:
         device: Device,
         max_bytes: float,
         progress: Callable[[int, int], object],
-    ) -> dict[frozenset[int], LitParts]:
-        """Lit parts of pieces of the scene's facets, past everything but each set of sheets."""
+    ) -> dict[Ways, LitParts]:
+        """Lit parts of pieces of the scene's facets, past everything but a set of sheets on the way to each antenna."""
         out = {}
-        for subset in subsets(range(len(self))):
-            solid = np.ones(len(self.scene.triangles), bool)
-            solid[self.rows[np.isin(self.group, list(subset))]] = False
+        for ways in product(subsets(range(len(self))), repeat=len(antennas)):
+            clear = np.zeros((len(self.scene.triangles), len(ways)), bool)
+            for column, through in zip(clear.T, ways, strict=True):
+                column[self.rows[np.isin(self.group, list(through))]] = True
+            solid = ~clear.all(axis=1)
+            some = replace(pieces, clear=clear[solid] if clear[solid].any() else None)
             past = self.scene.triangles[solid]
-            out[subset] = LitParts(device, pieces, past, antennas, max_bytes=max_bytes, progress=progress)
+            out[ways] = LitParts(device, some, past, antennas, max_bytes=max_bytes, progress=progress)
         return out
 
     def transmission(
@@ -150,44 +163,44 @@ class ThinSheets:
 
 @dataclass(frozen=True, eq=False)
 class SeenThrough:
-    """What one antenna sees of facets, m (k, 3, 3), through sets of sheets.
+    """What one antenna sees of facets, m (k, 3, 3), through sets of sheets, or two, each through its own.
 
     lit_parts  past everything but each set: `ThinSheets.lit_parts`
     """
 
     facets: np.ndarray
-    lit_parts: dict[frozenset[int], LitParts]
+    lit_parts: dict[Ways, LitParts]
 
     def between(self, first: int) -> SeenThrough:
         """The same, with pulses counted from `first`."""
-        return replace(self, lit_parts={subset: parts.between(first) for subset, parts in self.lit_parts.items()})
+        return replace(self, lit_parts={ways: parts.between(first) for ways, parts in self.lit_parts.items()})
 
-    def means(self, p: int, antenna: np.ndarray, waves: np.ndarray) -> Iterator[tuple[frozenset[int], np.ndarray]]:
-        """Sets of sheets, and means of exp(2j k u.rho) over the parts of facets that are seen through just these, from
-        place number p of the antenna, complex128 (1, k, m); the whole facet counts as the area.
+    def means(self, p: int, tx: np.ndarray, rx: np.ndarray, waves: np.ndarray) -> Iterator[tuple[Ways, np.ndarray]]:
+        """Sheets on each way, and means of exp(j k (u_t + u_r).rho) over the parts of facets that are seen through just
+        these, from place number p of the antennas, complex128 (1, k, m); the whole facet counts as the area.
 
-        antenna  m (1, 3);  waves  k, rad/m (m,)
+        tx, rx  m (3,), the same where lit parts are of one antenna;  waves  k, rad/m (m,)
         """
-        edges = self.facets[:, 1:] - self.facets[:, :1]
-        phases = 2 * edges @ unit(antenna[0] - self.facets.mean(axis=1))[:, :, None]
+        edges, middle = self.facets[:, 1:] - self.facets[:, :1], self.facets.mean(axis=1)
+        phases = edges @ (unit(tx - middle) + unit(rx - middle))[:, :, None]
         whole = triangle_mean(phases[:, 0] * waves, phases[:, 1] * waves)
-        past: dict[frozenset[int], np.ndarray] = {}
-        for subset, parts in self.lit_parts.items():
-            past[subset] = np.where(parts.dark[:, None], 0, whole)
+        past: dict[Ways, np.ndarray] = {}
+        for ways, parts in self.lit_parts.items():
+            past[ways] = np.where(parts.dark[:, None], 0, whole)
             if parts.partly.any():
-                past[subset][parts.partly] = parts.at(p, [antenna], waves)[1][0]
-        for subset in self.lit_parts:
-            part = sum((-1) ** (len(subset) - len(fewer)) * past[fewer] for fewer in subsets(subset))
-            yield subset, np.asarray(part)[None]
+                past[ways][parts.partly] = parts.at(p, [tx[None], rx[None]][: len(ways)], waves)[1][0]
+        for ways in self.lit_parts:
+            n, fewer = sum(map(len, ways)), product(*(subsets(through) for through in ways))
+            yield ways, np.asarray(sum((-1) ** (n - sum(map(len, some))) * past[some] for some in fewer))[None]
 
 
 @dataclass(frozen=True, eq=False)
 class FacetsThrough:
-    """The facets of a set as they are seen through some of the sheets before them."""
+    """The facets of a set as they are seen through sheets, on the ways to one antenna or to two."""
 
     part: FacetSet
     sheets: ThinSheets
-    subset: frozenset[int]
+    ways: Ways
 
     def __len__(self) -> int:
         return len(self.part)
@@ -205,12 +218,15 @@ class FacetsThrough:
         self, tx: np.ndarray, rx: np.ndarray, frequencies: np.ndarray, polarizations: Sequence[str],
         vertical: np.ndarray, light: Light,
     ) -> np.ndarray:  # fmt: skip
-        """As of `FacetSet`, times what the sheets let through there and back; tx is rx."""
+        """As of `FacetSet`, times what the sheets let through there and back."""
         matrix = self.part.amplitudes(tx, rx, frequencies, POLARIZATIONS, vertical, light)
         matrix = matrix.reshape(*matrix.shape[:2], 2, 2)
         centers, up = centroids(self.triangles), tuple(vertical.tolist())
-        through = self.sheets.transmission(self.subset, centers, unit(centers - tx), frequencies, up).swapaxes(0, 1)
-        out = np.swapaxes(through, -1, -2) @ matrix @ through
+        passed = [
+            self.sheets.transmission(through, centers, unit(centers - end), frequencies, up).swapaxes(0, 1)
+            for through, end in zip(self.ways, (tx, rx), strict=False)
+        ]
+        out = np.swapaxes(passed[-1], -1, -2) @ matrix @ passed[0]
         return np.asarray(out.reshape(*out.shape[:2], 4)[..., [POLARIZATIONS.index(name) for name in polarizations]])
 
 

@@ -108,7 +108,7 @@ def refuse_with_sheets(options: EchoOptions, scene: Scene, ends: list[np.ndarray
     asked for."""
     if not options.shadows or not may_hide(scene):
         return
-    ThinSheets.of(scene, ends)
+    ThinSheets.of(scene, ends, forward=options.forward)
     others = (("an array", options.array is not None), ("edges=True", options.edges))
     names = [name for name, is_given in others if is_given]
     if names:

@@ -72,6 +72,7 @@ class Clipper:
     origin    of the kernels, m (3,);  on_plane  m: corners nearer to a facet's plane lie in it
     bodies    number of the body of each occluder (n,), for forward scatter alone: facets do not shade the receiver's
               view of those of their own body; None: for echoes of both antennas' sides
+    clear     occluders that cast no shadow from each antenna (n, antennas) bool; None: all do
     """
 
     device: Device
@@ -80,6 +81,7 @@ class Clipper:
     on_plane: float
     max_bytes: float
     bodies: np.ndarray | None = None
+    clear: np.ndarray | None = None
 
     def light(
         self, receivers: Receivers, which: np.ndarray, pairs: np.ndarray, antennas: np.ndarray, waves: np.ndarray,
@@ -119,7 +121,10 @@ class Clipper:
         """Of pairs (n, 2): whether shadows miss the receiver, or cover it, as antennas up to `margin`, m, from these
         cast them (n,)."""
         if self.bodies is None or receivers.body is None:
-            return self._state(receivers, pairs, antennas, margin)
+            state = self._state(receivers, pairs, antennas, margin)
+            if self.clear is not None:  # the shadow that covers the receiver may be none
+                state[(state == COVERED) & self.clear[pairs[:, 1]].any(axis=1)] = UNDECIDED
+            return state
         # of forward scatter each antenna looks at its own side of a facet, and the second one past its own body
         tx, rx = (self._state(receivers, pairs, antennas[:, [end]], margin) for end in (0, 1))
         rx = np.where(self.bodies[pairs[:, 1]] == receivers.body[pairs[:, 0]], MISSED, rx)
@@ -194,6 +199,9 @@ class Clipper:
                 cast, (n_pairs, pulses * ends), None, launch_numbers(KERNELS, "cast_shadows", n_pairs=n_pairs),
                 receivers, device.upload(owner), device.upload(at.astype(np.int32)), solid, seen, shadows, corners,
             )  # fmt: skip
+            if self.clear is not None and self.clear[occluder].any():
+                cast_by = device.download(corners, np.empty((pulses, ends, n_pairs), np.uint8))
+                corners = device.upload(np.where(self.clear[occluder].T, np.uint8(0), cast_by))
         first, means = device.upload(begins.astype(np.int32)), []
         share = np.empty((pulses, len(which)), np.float32)
         most = MOST_WAVES[not device.is_cpu]

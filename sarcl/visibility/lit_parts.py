@@ -70,6 +70,7 @@ class FacetPieces:
     upper      (m,) bool, or one for all: given facets from which waves leave above that terrain: those that stand above
                it, and its own of which the upper side alone reflects
     forward    a second antenna sees what the first one lights from any side, shaded by other bodies alone
+    clear      occluders that cast no shadow from each antenna (n, antennas) bool; None: all do
     """
 
     triangles: np.ndarray
@@ -80,6 +81,7 @@ class FacetPieces:
     ground: np.ndarray | bool = False
     upper: np.ndarray | bool = False
     forward: bool = False
+    clear: np.ndarray | None = None
 
     @classmethod
     def uncut(
@@ -148,7 +150,8 @@ class LitParts:
             body = bodies_of(np.concatenate([pieces.given, self._occluders]))
             own, others = body[: len(pieces.given)], body[len(pieces.given) :]
         frame = self._origin, self._on_plane, max_bytes
-        self._clipper = Clipper(with_float64(device), self._occluders, *frame, others)
+        clear = None if pieces.clear is None else pieces.clear[solid]
+        self._clipper = Clipper(with_float64(device), self._occluders, *frame, others, clear)
         upper = np.broadcast_to(pieces.upper, len(pieces.given))
         self._parent, first = np.unique(of[keep], return_index=True)
         bodies = (None, None) if own is None else (own[of[keep]], own[self._parent])

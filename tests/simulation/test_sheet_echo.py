@@ -7,7 +7,7 @@ import pytest
 
 import sarcl
 from sarcl import shapes
-from sarcl.base.constants import SPEED_OF_LIGHT
+from sarcl.reference.facet import film
 
 EPS, THICKNESS, CENTER = 3.0, 0.01, 5e9  # relative permittivity, m, Hz
 GLASS = sarcl.Material(EPS, thickness=THICKNESS)
@@ -18,17 +18,10 @@ AZIMUTH, ELEVATION = np.radians([0.0, 20, 40, 60]), np.radians([80.0, 70, 60, 75
 GATE = 0.05  # dB
 
 
-def film(frequency, incidence):
-    """T_h, T_v of the glass, relative to the wave without it, by its characteristic matrix (Abeles)."""
-    c = np.cos(incidence)
-    inside, k = np.sqrt(EPS - np.sin(incidence) ** 2 + 0j), 2 * np.pi * frequency / SPEED_OF_LIGHT
-    delta = k * THICKNESS * inside
-    out = []
-    for outer, inner in ((c, inside), (1 / c, EPS / inside)):
-        b = np.cos(delta) + 1j * np.sin(delta) * outer / inner
-        d = 1j * inner * np.sin(delta) + np.cos(delta) * outer
-        out.append(2 * outer / (outer * b + d) * np.exp(1j * k * THICKNESS * c))
-    return out
+def passed(frequency, incidence):
+    """T_h, T_v of the glass."""
+    cosine, frequency = np.broadcast_arrays(np.cos(incidence), frequency)
+    return film(cosine, EPS, THICKNESS, frequency)[2:]
 
 
 def echo(scene, places, polarization=NAMES, **options):
@@ -58,11 +51,14 @@ SCENES = {
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_from_far_away_echoes_are_those_of_rcs(name):
-    scene = SCENES[name]
-    samples, frequencies, report = echo(scene, FAR * towards(AZIMUTH, ELEVATION), check=True)
-    s = sarcl.rcs(scene, AZIMUTH, ELEVATION, frequencies, polarization=NAMES).swapaxes(1, 2)
-    all_seen = sarcl.rcs(scene, AZIMUTH, ELEVATION, frequencies, polarization=NAMES, shadows=False).swapaxes(1, 2)
+@pytest.mark.parametrize("receiver", [None, (-0.5, 1.0)], ids=["one antenna", "two"])
+def test_from_far_away_echoes_are_those_of_rcs(name, receiver):
+    scene, options, hears = SCENES[name], {"polarization": NAMES, "receiver": receiver}, None
+    if receiver is not None:
+        hears = sarcl.Trajectory(None, FAR * towards(*(np.full(len(AZIMUTH), angle) for angle in receiver)))
+    samples, frequencies, report = echo(scene, FAR * towards(AZIMUTH, ELEVATION), receiver=hears, check=True)
+    s = sarcl.rcs(scene, AZIMUTH, ELEVATION, frequencies, **options).swapaxes(1, 2)
+    all_seen = sarcl.rcs(scene, AZIMUTH, ELEVATION, frequencies, shadows=False, **options).swapaxes(1, 2)
     assert np.linalg.norm(s - all_seen) > 0.02 * np.linalg.norm(s)
     assert np.linalg.norm(samples - s) < 1e-3 * np.linalg.norm(s)
     assert report.measured_error < 1e-6
@@ -75,10 +71,24 @@ def test_a_plate_behind_a_parallel_slab_is_seen_through_it_twice():
     plate = shapes.plate((0.1, 0.1), position=(0, 0, -1.0))
     both, front, (alone, frequencies, _) = echo(SHEET + plate, places)[0], echo(SHEET, places)[0], echo(plate, places)
     for p, angle in enumerate(incidence):
-        for column, through in enumerate(film(frequencies, angle)):
+        for column, through in enumerate(passed(frequencies, angle)):
             expected, behind = alone[p, column] * through**2, (both - front)[p, column]
             assert 20 * np.log10(np.linalg.norm(behind) / np.linalg.norm(expected)) == pytest.approx(0, abs=GATE)
             assert np.linalg.norm(behind - expected) < 1e-3 * np.linalg.norm(expected) + 1e-6 * np.linalg.norm(front[p])
+
+
+def test_a_receiver_elsewhere_sees_through_a_slab_at_its_own_angle():
+    """Transmitter and receiver at different angles in one plane: T(in) T(out), of H and of V."""
+    away = np.radians([10.0, 30.0, 50.0])
+    track, back = (FAR * towards(np.zeros(3), np.pi / 2 - angle) for angle in (away, -away[::-1] / 2))
+    plate, hears = shapes.plate((0.1, 0.1), position=(0, 0, -1.0)), sarcl.Trajectory(None, back)
+    both, front, alone = (echo(scene, track, receiver=hears) for scene in (SHEET + plate, SHEET, plate))
+    for p in range(3):
+        sent, returned = passed(both[1], away[p]), passed(both[1], away[::-1][p] / 2)
+        for column in range(2):
+            expected, behind = alone[0][p, column] * sent[column] * returned[column], (both[0] - front[0])[p, column]
+            near = 1e-3 * np.linalg.norm(expected) + 1e-6 * np.linalg.norm(front[0][p])
+            assert np.linalg.norm(behind - expected) < near
 
 
 NEAR, TWO = np.array([[6.0, 0.0, 20.0]]), ("HH", "VV")
@@ -91,7 +101,7 @@ def strips():
     total, n = 0.0, 8
     for x in (np.arange(n) + 0.5) / n - 0.5:
         alone, frequencies, _ = echo(shapes.plate((1.0 / n, 0.05), position=(x, 0, -1.0)), NEAR, TWO, tolerance=1e-3)
-        total += alone * np.square(film(frequencies, np.arctan2(NEAR[0, 0] - x, NEAR[0, 2] + 1.0)))
+        total += alone * np.square(passed(frequencies, np.arctan2(NEAR[0, 0] - x, NEAR[0, 2] + 1.0)))
     return total + echo(PANE, NEAR, TWO, tolerance=1e-3)[0]
 
 

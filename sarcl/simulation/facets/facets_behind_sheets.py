@@ -34,7 +34,7 @@ LOOKS, FREQUENCIES = 16, 9  # pulses and frequencies of the band at which the ch
 class FacetsBehindSheets:
     """Pieces of facets of which some pulse sees a part through thin sheets.
 
-    seen    what the antenna sees of them through which sheets
+    seen    what the antennas see of them through which sheets
     n_dark  pieces of the plan, which may be cut further, that are seen through sheets alone
     error   relative to the echoes of these pieces, at random phases
     """
@@ -74,23 +74,24 @@ class FacetsBehindSheets:
             )
         if not len(rows):
             return None
-        looks = seen.antennas.tx[spread_over(len(seen.antennas), LOOKS)]
+        looks = spread_over(len(seen.antennas), LOOKS)
         band = seen.waveform.center + seen.waveform.bandwidth * np.linspace(-0.5, 0.5, FREQUENCIES)
-        # an error of T by `steep` times the angle by which a line of sight to a corner differs, twice
-        steep = sheets.steepness(centroids(pieces.scene.triangles[rows]), looks, band)
+        # an error of T by its steepness times the angle by which a line of sight to a corner differs, on each way
+        places = centroids(pieces.scene.triangles[rows])
+        steep = sum(sheets.steepness(places, end[looks], band) for end in (seen.antennas.tx, seen.antennas.rx))
         distance = nearest(scene, seen.antennas, box(scene.triangles.reshape(-1, 3)))
-        edge = TRANSMISSION * error_budget / plan.gain * distance / max(2 * steep * TO_CORNER, 1e-9)
+        edge = TRANSMISSION * error_budget / plan.gain * distance / max(steep * TO_CORNER, 1e-9)
         triangles, of = cut(pieces.scene.triangles[rows], edge, MOST_FACETS)
         rows = rows[of]
         longest = float(np.maximum.reduce(edges(triangles)).max())
-        error = plan.gain * (plan.predicted_error + 2 * steep * TO_CORNER * longest / distance)
+        error = plan.gain * (plan.predicted_error + steep * TO_CORNER * longest / distance)
         wanted = np.ones(len(rows), bool)
         cut_up = FacetPieces(triangles, scene.two_sided[pieces.of[rows]], wanted, scene.triangles, pieces.of[rows])
         parts = sheets.lit_parts(cut_up, ends, request.device, **room)
         seen_rows = np.unique(rows[~np.all([one.dark for one in parts.values()], axis=0)])
         if not len(seen_rows):
             return None
-        n_dark = len(np.setdiff1d(seen_rows, rows[~parts[frozenset()].dark]))
+        n_dark = len(np.setdiff1d(seen_rows, rows[~parts[(frozenset(),) * len(ends)].dark]))
         part = FacetSet(
             triangles, pieces.scene.reflectivity[rows], pieces.scene.two_sided[rows], pieces.scene.material[rows],
             pieces.scene.materials, None, np.arange(len(rows)), np.zeros(len(rows), np.complex128),
@@ -140,11 +141,12 @@ class SheetEchoes:
             here = slice(first, first + step)
             block = replace(view, frequencies=view.frequencies[here])
             waves = 2 * np.pi * block.frequencies / SPEED_OF_LIGHT
-            for subset, mean in self.seen.means(pulse, antennas.tx[pulse : pulse + 1], waves):
-                if subset and mean.any():
-                    through = FacetsThrough(behind.part, behind.sheets, subset)
-                    light = Light(np.arange(n), np.ones((1, n)), mean)
-                    value, power = facet_samples(through, block, pulse, inside, light)
+            for ways, mean in self.seen.means(pulse, antennas.tx[pulse], antennas.rx[pulse], waves):
+                rows = np.flatnonzero(mean[0].any(axis=1) & inside)
+                if any(ways) and len(rows):
+                    through = FacetsThrough(behind.part.picked(rows), behind.sheets, ways)
+                    light = Light(np.arange(len(rows)), np.ones((1, len(rows))), mean[:, rows])
+                    value, power = facet_samples(through, block, pulse, np.ones(len(rows), bool), light)
                     values[:, here] += value
                     powers[:, here] += power
         return values, powers, int((~inside).sum())

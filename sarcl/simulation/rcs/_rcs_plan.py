@@ -134,7 +134,8 @@ class RcsPlan:
         if not self._may_shade or not may_hide(scene):
             return None
         keep, device = np.flatnonzero(scene.reflectivity > 0), task.device
-        sheets, pieces = ThinSheets.of(scene, self._antennas), scene.triangles[keep]
+        sheets = ThinSheets.of(scene, self._antennas, forward=task.is_forward)
+        pieces = scene.triangles[keep]
         facets, max_bytes = FacetPieces.uncut(pieces, scene.two_sided[keep]), budget(device, task.options.max_bytes)
         parts = sheets.lit_parts(facets, self._antennas, device, max_bytes, self._progress("shadows"))
         return sheets, SeenThrough(pieces, parts)
@@ -208,11 +209,15 @@ class RcsPlan:
         every, columns = np.arange(len(part)), [POLARIZATIONS.index(name) for name in task.polarizations]
         asked = replace(self, task=replace(task, polarizations=POLARIZATIONS))
         total = np.zeros((len(frequencies), 4), np.complex128)
-        for some, mean in seen.means(p, self._place(task.to_tx[p : p + 1]), waves):
+        looks = task.to_tx[p], task.to_rx[p]
+        for ways, mean in seen.means(p, self._place(looks[0]), self._place(looks[1]), waves):
             light = Light(every, np.ones((1, len(part))), mean)
             matrix = asked._sum(part, p, frequencies, light)[0].reshape(-1, 2, 2)
-            through = sheets.transmission(some, task.scene.center[None], -task.to_tx[p : p + 1], frequencies)[0]
-            total += (np.swapaxes(through, 1, 2) @ matrix @ through).reshape(-1, 4)
+            passed = [
+                sheets.transmission(through, task.scene.center[None], -look[None], frequencies)[0]
+                for through, look in zip(ways, looks, strict=False)
+            ]
+            total += (np.swapaxes(passed[-1], 1, 2) @ matrix @ passed[0]).reshape(-1, 4)
         return total[:, columns]
 
     def _sum(self, part: FacetSet, p: int, frequencies: np.ndarray, light: Light) -> tuple[np.ndarray, np.ndarray]:

@@ -147,18 +147,20 @@ ASIDE = sarcl.Trajectory.line(start=(-1e3, 90, 800), velocity=(0, 10, 0), prf=10
 CHIRP = sarcl.Waveform.chirp(center=5e9, bandwidth=100e6, duration=1e-6)
 HOUSE = shapes.plate((1, 1), material=GLASS) + shapes.plate((1, 1), position=(0, 0, -1))
 BEHIND = shapes.plate((1, 1), material=GLASS) + shapes.plate((1, 1), position=(1.25, 0, -1))
+FOUR = sum((shapes.plate((1, 1), position=(0, 0, 0.1 * i), material=GLASS) for i in range(1, 4)), HOUSE)
 ROUGH = replace(BEHIND, roughness=np.array([0, 0, 0.01, 0.01]))
 BAD = {
     "negative": (lambda: sarcl.Material(3, thickness=-1), "thickness is -1 m; it cannot be negative"),
     "of a conductor": (lambda: sarcl.Material(thickness=0.01), "thickness is 0.01 m of a perfect conductor"),
     "rough": (lambda: sarcl.Material(3, height=1e-3, thickness=0.01), "or a rough surface"),
     "closed body": (lambda: shapes.box((1, 1, 1), material=GLASS), "facet 0 reflects from one side .*two_sided=True"),
-    "echo elsewhere": (lambda: sarcl.echo(HOUSE, CHIRP, TRACK, receiver=ASIDE), "1 thin sheets; .*one antenna"),
+    "echo forward": (lambda: sarcl.echo(HOUSE, CHIRP, TRACK, receiver=ASIDE, forward=True), "computed with forward"),
     "echo of edges": (lambda: sarcl.echo(HOUSE, CHIRP, TRACK, edges=True), "not computed with edges=True"),
     "echo of bounces": (lambda: sarcl.echo(HOUSE, CHIRP, TRACK, bounces=2), "give bounces=1"),
     "echo of rough facets": (lambda: sarcl.echo(ROUGH, CHIRP, TRACK), "facet 2 lies behind a thin sheet"),
     "spectral echo": (lambda: sarcl.spectral_echo(HOUSE, CHIRP, TRACK), "for which use echo or rcs"),
-    "two antennas": (lambda: sarcl.rcs(HOUSE, 0, 1, 5e9, receiver=(0.1, 1)), "1 thin sheets; .*one antenna"),
+    "forward": (lambda: sarcl.rcs(HOUSE, 0, 1, 5e9, receiver=(0.1, 1), forward=True), "not computed with forward=True"),
+    "four for two": (lambda: sarcl.rcs(FOUR, 0, 1, 5e9, receiver=(0.1, 1)), "4 thin sheets; .*up to 3 with a receiver"),
     "checked": (lambda: sarcl.rcs(HOUSE, 0, 1, 5e9, check=True), "check=True has no second way"),
     "many": (
         lambda: sarcl.rcs(shapes.box((1, 1, 1), material=GLASS, two_sided=True), 0, 1, 5e9), "6 thin sheets; .*up to 4"
