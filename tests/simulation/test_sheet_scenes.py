@@ -15,7 +15,7 @@ CHIRP = sarcl.Waveform.chirp(center=5e9, bandwidth=100e6, duration=1e-6)
 NAMES = ("HH", "HV", "VH", "VV")
 TOLERANCE = 1e-2
 SIZE = 0.004  # m: pieces of the reference are dark or seen whole
-PIECES = 7e-3  # its error by this, relative to the echo: of 20 random scenes, 4 mm against 2 mm
+PIECES = 7e-3  # its share of the error of an echo: 4 mm against 2 mm, 16 random scenes, rms 5e-3, at most 1.2e-2
 GLASS, WET = sarcl.Material(3.0, thickness=0.01), sarcl.Material(5.0 - 0.5j, thickness=0.004)
 
 
