@@ -4,14 +4,12 @@
 //   columns   w[k, t] = sum_m a[t + m length, first + k],   as many m as there are rows of a; 0 where there is none
 //   lay       b[i, first + k] = v_i W[k, origin + sign i],  modulo length
 //
-// Backwards (sign -1) the transform has exp(+j ...) and needs no normalisation, as an inverse FFT would. A group of 8 x 8
+// Backwards (sign -1) the transform has exp(+j ...) and needs no normalisation, as an inverse FFT would. A group of SIDE x SIDE
 // work-items transposes a tile in local memory, so that neighbours read and write neighbours.
 //
 // symbols   a, b, w, W   arrays of complex numbers, re and im interleaved
-// macros    none
+// macros    SIDE   work-items of a group along each axis
 // reference: sarcl/reference/transposition.py:columns, sarcl/reference/transposition.py:lay
-
-#define ACROSS 8  // work-items of a group along each axis
 
 // global size (length, count)
 //   from  (..., length, 2);  out (count, length, 2)
@@ -24,10 +22,10 @@ typedef struct {
     int n_rows, stride, first, length, count;
 } columns_numbers;
 
-// global size (length, count), each rounded up to whole groups (8, 8)
+// global size (length, count), each rounded up to whole groups (SIDE, SIDE)
 //   from  (n_rows, stride, 2);  out (count, length, 2)
 __kernel void columns(columns_numbers given, __global const float *restrict from, __global float *restrict out) {
-    __local float2 tile[ACROSS][ACROSS + 1];
+    __local float2 tile[SIDE][SIDE + 1];
     int x = get_local_id(0), y = get_local_id(1);
     int t0 = (int)get_global_id(0) - x, k0 = (int)get_global_id(1) - y;
     float2 sum = (float2)(0, 0);
@@ -45,11 +43,11 @@ typedef struct {
     int length, origin, sign, n, count, stride, first;
 } lay_numbers;
 
-// global size (count, n), each rounded up to whole groups (8, 8)
+// global size (count, n), each rounded up to whole groups (SIDE, SIDE)
 //   spectra  (count, length, 2);  weights (n): v;  out (n, stride, 2)
 __kernel void lay(lay_numbers given, __global const float *restrict spectra, __global const float *restrict weights,
                   __global float *restrict out) {
-    __local float2 tile[ACROSS][ACROSS + 1];
+    __local float2 tile[SIDE][SIDE + 1];
     int x = get_local_id(0), y = get_local_id(1);
     int k0 = (int)get_global_id(0) - x, i0 = (int)get_global_id(1) - y;
     float2 value = (float2)(0, 0);

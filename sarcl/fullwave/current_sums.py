@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..opencl.device import Device
+from ..opencl.group_sizes import first_allowed
 from ..opencl.launch_numbers import launch_numbers
 from ..opencl.memory_budget import budget
 from .currents import Currents
@@ -16,8 +17,8 @@ from .currents import Currents
 BLOCK = 8  # frequencies whose sums a work-item has in registers, as in kernels/current_sums.cl
 CHUNK = 2048  # cells of a work-item: float32 sums over more would lose digits
 PULSES = 256  # at a time
-GROUP = 32  # pulses of a work-group that keeps paths in local memory
-PATHS = 2 * 4 * 32 * GROUP  # bytes of these: to and from the 32 cells of a tile
+GROUPS = 32, 16, 8  # pulses of a work-group that keeps paths in local memory, most first
+PATHS = 2 * 4 * 32 * GROUPS[0]  # bytes of these: to and from the 32 cells of a tile
 BENT = 1e-4  # cycles: largest error of a phase that is taken as linear in the frequency over BLOCK frequencies
 
 
@@ -58,13 +59,10 @@ def current_sums(device: Device, currents: Currents, paths: Paths, *, max_bytes:
     n_frequencies, n_pulses = len(paths.sent), len(paths.tx)
     out = np.zeros((6, n_pulses, n_frequencies), np.complex128)
     reach = max((float(np.linalg.norm(offset, axis=1).max()) for _, offset, _ in lists if len(offset)), default=0.0)
-    group = GROUP if device.info.vector_width == 1 and device.shares(PATHS, GROUP) else 0
-    kernel = device.kernel(
-        "current_sums.cl",
-        "current_sums",
-        BISTATIC=int(paths.bistatic),
-        LINEAR=int(_is_linear(paths, reach)),
-        GROUP=group,
+    macros = {"BISTATIC": int(paths.bistatic), "LINEAR": int(_is_linear(paths, reach))}
+    sizes = GROUPS if device.info.vector_width == 1 and device.shares(PATHS, GROUPS[-1]) else ()
+    group, (kernel,) = first_allowed(
+        device, (*sizes, 0), lambda items: (device.kernel("current_sums.cl", "current_sums", **macros, GROUP=items),)
     )
     lanes, blocks = max(group, 1) * device.info.vector_width, -(-n_frequencies // BLOCK)
     for first in range(0, n_pulses, PULSES):

@@ -165,7 +165,7 @@ class Gridder:
         self.cell = cell.astype(np.int32)
         self.line = np.stack([position - cell, high, step - high], axis=-1).reshape(-1, 6).astype(np.float32)
         macros = {"TAPS": plan.interpolator.taps, "TERMS": plan.interpolator.terms, "TILE": self.tile}
-        self.kernel = device.kernel("nufft2d.cl", "spread", **macros, VW=1, GROUPED=int(shared_tile.used_by(device)))
+        self.grouped, self.kernel = shared_tile.spreading_kernel(device, "nufft2d.cl", **macros, VW=1)
         self.table = device.upload(plan.interpolator.table)
 
     def blocks(self, budget: float, shape: tuple[int, ...], row_bytes: float = 0) -> tuple[int, int]:
@@ -241,8 +241,9 @@ class Gridder:
                         buffer = samples.buffer(pipeline, start, stop)
                         clock.lap("samples")
                     cell, line = (pipeline.upload(a[start:stop]) for a in (self.cell, self.line))
+                    tiles = -(-m1 // self.tile), last - first
                     self.device.run(
-                        self.kernel, *shared_tile.launch(self.device, (-(-m1 // self.tile), last - first)),
+                        self.kernel, *shared_tile.launch(self.device, tiles, self.grouped),
                         launch_numbers(
                             "nufft2d.cl", "spread", n_rows=stop - start, n_samples=self.n_samples, m0=m0, m1=m1,
                             first=first, add=start > 0,

@@ -5,19 +5,22 @@ Kernels: kernels/transposition.cl, before and after an FFT of rows.
 
 from __future__ import annotations
 
+from math import isqrt
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..opencl.device import Device
 from ..opencl.fft_batches import Batches
+from ..opencl.group_sizes import first_allowed
 from ..opencl.launch_numbers import launch_numbers
 
 if TYPE_CHECKING:
     from ..opencl.device import Buffer
 
 
-ACROSS = 8  # work-items of a group along each axis, as in kernels/transposition.cl
+KERNELS, NAMES = "transposition.cl", ("rows", "columns", "lay")
+SIDES = 8, 4, 2, 1  # work-items of a group along each axis, most first
 
 
 class Transforms:
@@ -34,9 +37,12 @@ class Transforms:
         self.most = min(count, self._batches.most)
         self.nbytes = self._batches.nbytes(count)
         self._count, self._work = count, None
-        self._rows, self._columns, self._lay = (
-            device.kernel("transposition.cl", name) for name in ("rows", "columns", "lay")
+        items, (self._rows, self._columns, self._lay) = first_allowed(
+            device,
+            [side**2 for side in SIDES],
+            lambda items: tuple(device.kernel(KERNELS, name, SIDE=isqrt(items)) for name in NAMES),
         )
+        self._group = (isqrt(items), isqrt(items))
 
     def rows(self, array: Buffer, first: int, count: int) -> None:
         """Transform rows first ... first + count - 1 of a buffer (..., length)."""
@@ -48,12 +54,12 @@ class Transforms:
 
         Longer columns are added up at the same remainders by the length.
         """
-        size = _whole(self.length), _whole(count)
+        size = self._whole(self.length, count)
         work = self._reserved()
         self.device.run(
-            self._columns, size, (ACROSS, ACROSS),
+            self._columns, size, self._group,
             launch_numbers(
-                "transposition.cl", "columns", n_rows=shape[0], stride=shape[1], first=first, length=self.length,
+                KERNELS, "columns", n_rows=shape[0], stride=shape[1], first=first, length=self.length,
                 count=count,
             ),
             array, work, steps=-(-shape[0] // self.length),
@@ -71,9 +77,9 @@ class Transforms:
         """
         factors, n = weights
         self.device.run(
-            self._lay, (_whole(count), _whole(n)), (ACROSS, ACROSS),
+            self._lay, self._whole(count, n), self._group,
             launch_numbers(
-                "transposition.cl", "lay", length=self.length, origin=origin, sign=sign, n=n, count=count,
+                KERNELS, "lay", length=self.length, origin=origin, sign=sign, n=n, count=count,
                 stride=stride, first=first,
             ),
             self._work, factors, out,
@@ -85,6 +91,7 @@ class Transforms:
         self._work = next(self._batches.of(1))[2]
         return self._work
 
-
-def _whole(n: int) -> int:
-    return -(-n // ACROSS) * ACROSS
+    def _whole(self, columns: int, rows: int) -> tuple[int, int]:
+        """Work-items of an array, in whole groups."""
+        side = self._group[0]
+        return -(-columns // side) * side, -(-rows // side) * side

@@ -9,6 +9,7 @@ For other folders:
     fft            FFT of rows: reikna on GPUs, scipy.fft on CPU devices
     fft_batches    rows that a device transforms some at a time, all in one buffer
     native_functions  the error of a device's own sine and cosine
+    group_sizes    work-items of a kernel's groups, as many as the driver allows for this kernel
     launch_numbers  numbers of a kernel's launch as one struct by value, given by name
     memory_budget  bytes that a computation may take on a device
     pipeline       blocks of work on a device: the upload of one while the device works on the one before

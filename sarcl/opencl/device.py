@@ -23,8 +23,9 @@ from .programs import build, kernels_of, names_in, quiet, source
 if TYPE_CHECKING:
     import pyopencl
     from pyopencl import Buffer as Buffer  # returned by upload, zeros and empty
+    from pyopencl import Kernel as Kernel
 else:
-    Buffer = Any  # in annotations alone: pyopencl is loaded with the first device
+    Buffer = Kernel = Any  # in annotations alone: pyopencl is loaded with the first device
 
 GROUP = 16  # work-items per group on a CPU (1 where the size does not divide by it), for kernels of any group size
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
 from typing import Any, Protocol
@@ -20,7 +20,8 @@ from ..numerics.interpolator_choice import choose_interpolator
 from ..numerics.plan import LEAST_TOLERANCE, Plan, ProfileSums, carrier_steps, cheapest, least
 from ..numerics.pulse_geometry import PulseGeometry
 from ..numerics.tiles import Tiles, tile_points
-from ..opencl.device import Buffer, Device
+from ..opencl.device import Buffer, Device, Kernel
+from ..opencl.group_sizes import first_allowed
 from ..scattering.antenna_weights import AntennaWeights
 from .kernel_images import PatchSamples
 
@@ -308,11 +309,13 @@ class Rows:
     grouped  work-groups add rows up, in local memory
     """
 
-    def __init__(self, device: Device, stride: int, channels: int, n_pulses: int, n_tiles: int) -> None:
-        """stride  samples of a row;  channels  rows of a pulse;  n_pulses, n_tiles  in all"""
+    def __init__(
+        self, device: Device, stride: int, channels: int, n_pulses: int, n_tiles: int, *, alone: bool = False
+    ) -> None:
+        """stride  samples of a row;  channels  rows of a pulse;  n_pulses, n_tiles  in all;  alone  never grouped"""
         self.device, self.stride, self.channels = device, stride, channels
         lanes = device.info.vector_width > 1
-        self.grouped = not lanes and device.shares(LOCAL, GROUP)
+        self.grouped = not (lanes or alone) and device.shares(LOCAL, GROUP)
         self._pulses, self._sums = (TOGETHER, SUMS) if lanes else (1, 1)
         self.items = GROUP if self.grouped else 1
         launched = min(n_pulses, most_pulses(device)) if self.grouped else n_pulses
@@ -321,6 +324,19 @@ class Rows:
         self.splits = int(min(splits, n_tiles, n_tiles if self.grouped else 64))
         self._plane = 0 if self.grouped else self._sums * ((stride + 15) // 8 * 8)
         self._buffer: tuple[int, Buffer] | None = None
+
+    @classmethod
+    def with_kernels(
+        cls, device: Device, shape: tuple[int, int, int, int], build: Callable[[Mapping[str, int]], tuple[Kernel, ...]]
+    ) -> tuple[Rows, tuple[Kernel, ...]]:
+        """Rows of a shape, and the kernels that `build` makes of their macros: not grouped where the driver allows too
+        few work-items for these kernels.
+
+        shape  stride, channels, n_pulses, n_tiles
+        """
+        of_items = {rows.items: rows for rows in (cls(device, *shape), cls(device, *shape, alone=True))}
+        items, kernels = first_allowed(device, of_items, lambda items: build(of_items[items].macros))
+        return of_items[items], kernels
 
     @property
     def macros(self) -> dict[str, int]:

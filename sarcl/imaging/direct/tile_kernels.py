@@ -18,6 +18,7 @@ from ...numerics.plan import Plan
 from ...numerics.tile_constants import TileConstants
 from ...numerics.tiles import Tiles
 from ...opencl.device import Buffer, Device
+from ...opencl.group_sizes import first_allowed
 from ...opencl.launch_numbers import launch_numbers
 from ..pixel_taper import WEIGHT_BUFFERS
 from ..tiling.plane import LineTiling
@@ -192,20 +193,13 @@ class SharedLineKernel(_Lines):
         self.schedule = device.kernel("schedule_pulses.cl", "schedule_pulses", **self.macros)
         bound = REGISTERS if plan.slopes and device.bounds_registers else 0
         macros = self.macros | {"REGISTERS": bound}
-        self._built = partial(device.kernel, "backproject_shared_lines.cl", "backproject_shared_lines", **macros)
-        self.items = self._items()
-        self.kernel = self._built(ITEMS=self.items)
+        built = partial(device.kernel, "backproject_shared_lines.cl", "backproject_shared_lines", **macros)
+        # the sums of pixels are the same with fewer items
+        sizes = [plan.items >> n for n in range((plan.items // plan.least_items).bit_length())]
+        self.items, (self.kernel,) = first_allowed(device, sizes, lambda items: (built(ITEMS=items),))
         self.add_parts = device.kernel("assemble_image.cl", "add_parts")
         interpolators = (plan.interpolator, plan.line, plan.slopes or plan.line)
         self.tables = [np.ravel(one.table) for one in interpolators]  # structs of the kernel's arguments
-
-    def _items(self) -> int:
-        """Work-items of a group: those of the plan, halved until the driver allows them for this kernel. The sums of
-        pixels stay the same."""
-        items = self.plan.items
-        while items > self.plan.least_items and self.device.max_group(self._built(ITEMS=items)) < items:
-            items //= 2
-        return items
 
     def add(self, on: TilesOnDevice, low: int, high: int, block: Block, image: Buffer) -> None:
         """Add a block of pulses to tiles low ... high - 1 of `image` (4, pixels)."""

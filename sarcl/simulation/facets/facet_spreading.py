@@ -38,7 +38,7 @@ from ..spreading import (
 )
 from ._piece_tiling import PieceTiling
 
-KERNELS = "spread_facets.cl"
+KERNELS, NAMES = "spread_facets.cl", ("facet_amplitudes", "spread_facets")
 MOST_PULSES = 256  # pulses per block where amplitudes are interpolated: two blocks cannot share their nodes
 NODES_SHARE = 0.2  # of the tolerance that is left: the most that interpolation between pulse nodes may take
 
@@ -179,22 +179,22 @@ class FacetSpreader:
         tiles, nodes, bistatic = self.tiles, scatterers.facet_plan.nodes, not self.antennas.is_monostatic
         self.channels = len(nodes) * len(self.polarizations)
         stride = plan.length + 2 * range_profiles.padding(plan.interpolator)
-        self.rows = Rows(device, stride, self.channels, len(self.antennas), tiles.n_tiles)
         macros = {**plan.macros(bistatic), **weights.macros(len(nodes)), "TILE": tiles.per_tile}
         macros |= {
             "METAL": int(scatterers.metal),
             "DISPERSIVE": int(scatterers.dispersive),
             "ROUGH": int(self.facets.is_rough),
             "PULSE_NODES": self.pulse_nodes.order,
-            **self.rows.macros,
             "PARTLY": int(self.partly),
             "SHADED": int(self.facets.illumination is not None),
             **{name: int(name in self.polarizations) for name in POLARIZATIONS},
             **(diagram_macros() if self.facets.is_rough else {}),
         }
         self.constants = TileConstants(device, plan, bistatic=bistatic)
-        self.amplitudes, self.spread = (
-            device.kernel(KERNELS, name, **macros) for name in ("facet_amplitudes", "spread_facets")
+        self.rows, (self.amplitudes, self.spread) = Rows.with_kernels(
+            device,
+            (stride, self.channels, len(self.antennas), tiles.n_tiles),
+            lambda of_rows: tuple(device.kernel(KERNELS, name, **macros, **of_rows) for name in NAMES),
         )
         at_nodes = nodes / SPEED_OF_LIGHT, scatterers.facet_plan.scales(), nodes / weights.frequency
         self.nodes = device.upload(np.stack(at_nodes).astype(np.float32))

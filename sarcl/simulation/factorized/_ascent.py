@@ -11,6 +11,7 @@ from ...numerics import range_profiles
 from ...numerics.device_profiles import SpreadSamples
 from ...numerics.pulse_geometry import PulseGeometry
 from ...opencl.device import Buffer, Device
+from ...opencl.group_sizes import first_allowed
 from ...opencl.launch_numbers import launch_numbers
 from ..spreading import most_pulses
 from ._leaves import Leaves
@@ -18,10 +19,11 @@ from .cells import CellLevel
 from .levels import FactorizedPlan, Level
 from .scatterers import Scatterers
 
-EXPAND = "expand_subapertures.cl"
+EXPAND, NAMES = "expand_subapertures.cl", ("moves", "expand")
 # bytes that a pulse reads of the cells of a launch on a CPU: the next pulse reads nearly the same from a core's cache
 CACHED = 2**19
-SPAN, GROUP_SPAN, GROUP = 512, 256, 64  # samples that a work-group of a CPU adds up, and of a GPU; its work-items there
+SPAN, GROUP_SPAN = 512, 256  # samples that a work-group of a CPU adds up, and of a GPU
+GROUPS = 64, 32, 16, 8, 1  # work-items of a group on a GPU, most first
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,13 +180,14 @@ class Ascent:
         """Add profiles of cells (first, stop) of a level to those of a target."""
         device, plan, (first, last), join = self.device, self.plan, cells, self.joins[level]
         planned, pulses, taps = plan.levels[level], target.pulses, plan.between.taps
-        span, items = (SPAN, 1) if device.is_cpu else (GROUP_SPAN, GROUP)
+        span, sizes = (SPAN, (1,)) if device.is_cpu else (GROUP_SPAN, GROUPS)
         macros = {
             "BISTATIC": int(self.bistatic), "WRAP": 0, "TAPS": taps, "TERMS": plan.between.terms,
             "FROM_CENTRE": int(level == 0), "FILTER_TAPS": planned.decimation.filter.shape[1], "SPAN": span,
-            "ITEMS": items,
         }  # fmt: skip
-        moves, expand = (device.kernel(EXPAND, name, **macros) for name in ("moves", "expand"))
+        items, (moves, expand) = first_allowed(
+            device, sizes, lambda items: tuple(device.kernel(EXPAND, name, **macros, ITEMS=items) for name in NAMES)
+        )
         records = device.empty(4 * (4 + taps) * pulses.n_used * (last - first))
         numbers = {"n": pulses.n, "n_used": pulses.n_used, "n_larger": join.n_larger, "n_tiles": len(planned.cells)}
         launch = launch_numbers(EXPAND, "moves", **numbers, first=first)

@@ -90,10 +90,13 @@ class _PointKernel:
         device, n_nodes, bistatic = points.device, len(spreader.nodes), not antennas.is_monostatic
         self.tiles = tiles = points.tiles(plan.per_tile)
         stride = plan.length + 2 * range_profiles.padding(plan.interpolator)
-        self.rows = Rows(device, stride, n_nodes, len(antennas), tiles.n_tiles)
         macros = {**plan.macros(bistatic, antennas.wrap), **weights.macros(n_nodes), "TILE": tiles.per_tile}
         self.tile_constants = TileConstants(device, plan, bistatic=bistatic, wrap=antennas.wrap)
-        self.kernel = device.kernel("spread_points.cl", "spread", **macros, **self.rows.macros)
+        self.rows, (self.kernel,) = Rows.with_kernels(
+            device,
+            (stride, n_nodes, len(antennas), tiles.n_tiles),
+            lambda of_rows: (device.kernel("spread_points.cl", "spread", **macros, **of_rows),),
+        )
         self.table = device.upload(plan.interpolator.table)
         self.ratios = device.upload((spreader.nodes / weights.frequency).astype(np.float32))
         self.patterns, self.second = weights.upload(device)

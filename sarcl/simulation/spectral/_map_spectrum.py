@@ -62,9 +62,8 @@ class ReflectivityMap:
         self.first = device.upload(np.stack(first, axis=1)[self.order])
         self.rest = device.upload(np.stack(rest, axis=1)[self.order])
         self.wave = np.exp(-2j * np.pi * cycles).astype(np.complex64)
-        grouped = int(shared_tile.used_by(device))
-        self.macros = {"VW": 1, "TAPS": taps, "TERMS": plan.kernel.terms, "TILE": plan.tile, "GROUPED": grouped}
-        self.spread = device.kernel("spectral_echo.cl", "spread", **self.macros, NODES=1)
+        self.macros = {"VW": 1, "TAPS": taps, "TERMS": plan.kernel.terms, "TILE": plan.tile}
+        self.grouped, self.spread = shared_tile.spreading_kernel(device, "spectral_echo.cl", **self.macros, NODES=1)
         self.table = device.upload(plan.kernel.table)
         self.flat = device.upload(_flat(plan.kernel))
 
@@ -96,8 +95,8 @@ class ReflectivityMap:
             n = min(at_once, plan.n_rows // plan.tile - first)
             made = device.empty(n * a_band)
             device.run(
-                self.spread, *shared_tile.launch(device, (n_tiles, n)), values, self.first, self.rest, self.start,
-                self.table, n_tiles, first, made,
+                self.spread, *shared_tile.launch(device, (n_tiles, n), self.grouped), values, self.first, self.rest,
+                self.start, self.table, n_tiles, first, made,
             )  # fmt: skip
             rows = device.download(made, np.empty((n * plan.tile, plan.n_columns), np.complex64))
             wave = fft.rows(device, rows)
@@ -120,7 +119,9 @@ class ReflectivityMap:
         tables        complex (M, n): A at the transfer's frequencies, for these amplitudes
         """
         device, plan = self.device, self.plan
-        kernel = device.kernel("spectral_echo.cl", "migrate", **self.macros, NODES=len(tables))
+        kernel = device.kernel(
+            "spectral_echo.cl", "migrate", **self.macros, GROUPED=int(self.grouped), NODES=len(tables)
+        )
         held = device.upload(np.ascontiguousarray(tables, np.complex64))
         basis = device.upload(transfer.basis(frequencies).astype(np.float32))
         for part, coordinates in self.coordinates(transfer, frequencies, wavenumbers, budget):
