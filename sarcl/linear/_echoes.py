@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Literal, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.sparse import issparse
 from scipy.sparse.linalg import LinearOperator
 
 from ..base.validation import choice, converted, count, finite, number
@@ -40,7 +41,11 @@ class _Named(LinearOperator):
     domain = "pixel"
 
     def dot(self, x: ArrayLike) -> np.ndarray:
-        """self @ x of a vector (n,) or of columns (n, k)."""
+        """self @ x of a vector (n,) or of columns (n, k); the product with a number or an operator is an operator."""
+        if isinstance(x, LinearOperator) or np.isscalar(x):
+            return super().dot(x)
+        if issparse(x):
+            raise TypeError(f"x is a {type(x).__name__}, and columns are dense arrays: give x.toarray()")
         x = np.asarray(x)
         if x.ndim not in (1, 2) or x.shape[0] != self.shape[1]:
             raise ValueError(
@@ -50,7 +55,11 @@ class _Named(LinearOperator):
         return np.asarray(self.matvec(x) if x.ndim == 1 else self.matmat(x))
 
     def __matmul__(self, x: ArrayLike) -> np.ndarray:
-        return super().__matmul__(x) if isinstance(x, LinearOperator) else self.dot(x)
+        return super().__matmul__(x) if np.isscalar(x) else self.dot(x)
+
+    def _matmat(self, x: np.ndarray) -> np.ndarray:
+        columns = [self.matvec(column) for column in x.T]
+        return np.stack(columns, axis=1) if columns else np.zeros((self.shape[0], 0), self.dtype)
 
 
 class _Adjoint(_Named):
@@ -188,7 +197,7 @@ class Echoes(_Named):
         is_one_antenna = self._like.rx is self._like.tx
         if of is None:
             of = [kind for kind in KINDS if kind != "rx" or not is_one_antenna]
-        kinds: list[Kind] = [of] if isinstance(of, str) else [*of]
+        kinds: list[Kind] = [of] if isinstance(of, str) or not isinstance(of, Iterable) else [*of]
         for kind in kinds:
             choice("of", kind, KINDS)
         x, y = (self._vector(name, value, n) for name, value, n in (("x", x, 1), ("y", y, 0)))
@@ -294,7 +303,7 @@ class Echoes(_Named):
             return torch_batch(operator, x, inside, out)
         array = np.asarray(x)
         vectors, shape = rows_of_batch(array, inside, out)
-        return np.stack([operator @ one for one in vectors]).reshape(shape)
+        return np.ascontiguousarray((operator @ vectors.T).T).reshape(shape)
 
     def _matvec(self, x: np.ndarray) -> np.ndarray:
         measurement = self._measurement
@@ -315,17 +324,23 @@ class Echoes(_Named):
     def _applied(self, name: str, apply: Callable[[np.ndarray], np.ndarray], values: np.ndarray) -> np.ndarray:
         """`apply` to finite values (n,) of any size: scaled by a power of two, and the result scaled back."""
         out = self.result_type(values.dtype)
-        values = converted(name, values, out)
+        values = converted(name, values, np.result_type(values.dtype, out))
         finite(name, values)
         open_device(self._device)  # refused in a process that was forked
         numbers = values.view(values.real.dtype)
         largest = float(np.abs(numbers).max(initial=0.0))
         exponent = np.frexp(largest)[1]
-        scaled = np.ldexp(numbers, -exponent).view(values.dtype)
+        scaled = np.ldexp(numbers, -exponent).view(values.dtype).astype(out)
         with self._lock:
-            result = np.array(apply(scaled), order="C")
-        parts = result.view(result.real.dtype)
-        return np.ldexp(parts, exponent).view(result.dtype).astype(out)
+            result = np.array(apply(scaled), np.complex128, order="C")
+        parts = np.ldexp(result.view(np.float64), exponent)
+        with np.errstate(over="ignore"):
+            final = parts.view(np.complex128).astype(out)
+        if not np.isfinite(final).all() or (result.any() and not final.any()):
+            raise ValueError(
+                f"{name} has numbers to {largest:.3g}, and the result leaves the range of {out}: scale {name}"
+            )
+        return final
 
     def _adjoint(self) -> _Adjoint:
         return _Adjoint(self)

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.cases import noise_history, noise_on
+from scipy.sparse import csr_matrix
 
 import sarcl
 from sarcl.reference.linear import matrix, spread
@@ -253,6 +254,30 @@ def test_matrices_norms_and_batches():
     assert A.H.H is A and (2 * A).shape == A.shape
 
 
+@pytest.mark.parametrize("exact", [False, True])
+def test_the_algebra_of_operators_and_other_input(exact):
+    like = noise_history(n_rows=9, n_samples=16)
+    A = sarcl.linear.Echoes(GRID, like, exact=exact)
+    M = matrix(like, GRID.positions.reshape(-1, 3)).reshape(A.shape)
+    x, y = random_vector(A.shape[1]), random_vector(A.shape[0], 1)
+    half = -A * 0.5
+    for got, expected in (
+        (half @ x, -0.5 * M @ x),
+        (half.H @ y, -0.5 * M.conj().T @ y),
+        ((A.H @ A) @ x, M.conj().T @ (M @ x)),
+        ((A.H * A).dot(x), M.conj().T @ (M @ x)),
+        (A.T @ y, M.T @ y),
+        (y @ A, y @ M),
+        (A @ x.real, M @ x.real),
+        (A @ np.arange(204, dtype=np.uint8), M @ np.arange(204)),
+        (A @ np.repeat(x, 2)[::-2], M @ x[::-1]),
+        (A @ x.astype(">c8"), M @ x),
+        (A.H @ np.asfortranarray(np.outer(y, [1, 2j])), M.conj().T @ np.outer(y, [1, 2j])),
+    ):
+        assert np.linalg.norm(got - expected) < 1e-3 * np.linalg.norm(expected)
+    assert (A @ np.zeros((204, 0))).shape == (144, 0) and A.A(np.zeros((0, 17, 12))).shape == (0, 9, 16)
+
+
 def test_reference_sums_are_those_of_the_matrix():
     like = noise_history(n_rows=3, n_samples=5)
     points = GRID.positions.reshape(-1, 3)[:4]
@@ -268,6 +293,12 @@ def test_reference_sums_are_those_of_the_matrix():
         (lambda A: A.H @ np.r_[np.zeros(7), np.inf, np.zeros(136)], ValueError, r"y\[7\]"),
         (lambda A: A.A(np.ones((12, 17))), ValueError, "17, 12"),
         (lambda A: A.norm(tolerance=0), ValueError, "tolerance"),
+        (lambda A: A @ np.full(204, 1e60), ValueError, r"x has numbers to 1e\+60.*complex64: scale x"),
+        (lambda A: A @ np.full(204, 1e-60), ValueError, "scale x"),
+        (lambda A: A.H @ np.full(144, 3e38), ValueError, "scale y"),
+        (lambda A: A @ csr_matrix(np.ones((204, 1))), TypeError, "toarray"),
+        (lambda A: A @ 3.0, ValueError, "Scalar"),
+        (lambda A: A.gradients(np.ones(204), np.ones(144), of=3), ValueError, "of is 3; choose"),
         (lambda A: pickle.dumps(A), TypeError, "cannot be pickled"),
         (lambda A: copy.deepcopy(A), TypeError, "make it in the process"),
     ],
