@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from scipy.sparse import issparse
 from scipy.sparse.linalg import LinearOperator
 
+from ..base.errors import ToleranceUnreachable
 from ..base.validation import choice, converted, count, finite, number
 from ..imaging.antenna_beam import AntennaBeam
 from ..imaging.backproject_options import BackprojectOptions
@@ -30,6 +31,9 @@ from ._gradients import KINDS, Gradients, Kind
 from ._measurement import Arguments, Domain, measurement_of
 
 MOST_ROUNDS = 200  # of the power iteration
+# Errors of both directions are independent: <y, A x> - <A.H y, x> is smaller than they are by the root of the numbers
+# that it adds up. With fewer numbers than MANY plans are made for a smaller tolerance, which costs little there.
+MANY, LEAST_SHARE = 1000, 0.1
 
 
 class _Named(LinearOperator):
@@ -140,22 +144,35 @@ class Echoes(_Named):
         self._measurement = measurement = measurement_of(domain, like, arguments)
         self._available = budget(self._device, arguments.max_bytes)
         self._gradients: Gradients | None = None
-        options = BackprojectOptions(
-            tolerance=self.tolerance, method=arguments.method, device=self._device, max_bytes=arguments.max_bytes
-        )
         self._forward: PointEchoes | TransposedImage
         if self.exact or self.tolerance < LEAST_TOLERANCE or measurement.is_cut:
             self._forward = self._float64_pair(arguments.method, known)
-            chosen = self._forward.choice
+            self._image = Image(self._options(self.tolerance), measurement, self._forward.choice)
         else:
-            chosen = options.choose(measurement.task, [self._device])
-            self._forward = PointEchoes(self._device, measurement, self.tolerance, arguments.method, self._available)
+            few = np.sqrt(min(measurement.seen_pixels, np.prod(measurement.shape)) / MANY)
+            inner = max(self.tolerance * min(max(few, LEAST_SHARE), 1.0), LEAST_TOLERANCE)
+            try:
+                self._plan_in_float32(inner)
+            except ToleranceUnreachable:
+                if inner == self.tolerance:
+                    raise
+                self._plan_in_float32(self.tolerance)
         self._pair = self._forward if isinstance(self._forward, TransposedImage) else None
-        self._image = Image(options, measurement, chosen)
-        self.predicted_error = max(self._forward.predicted_error, chosen.predicted_error)
+        self.predicted_error = max(self._forward.predicted_error, self._image.choice.predicted_error)
         dtype = np.complex128 if self.tolerance < LEAST_TOLERANCE else np.complex64
         rows, samples = measurement.shape
         super().__init__(dtype, (rows * samples, measurement.task.grid.size))
+
+    def _options(self, tolerance: float) -> BackprojectOptions:
+        method, most = self._arguments.method, self._arguments.max_bytes
+        return BackprojectOptions(tolerance=tolerance, method=method, device=self._device, max_bytes=most)
+
+    def _plan_in_float32(self, tolerance: float) -> None:
+        """Plan each direction by itself."""
+        measurement, options = self._measurement, self._options(tolerance)
+        chosen = options.choose(measurement.task, [self._device])
+        self._forward = PointEchoes(self._device, measurement, tolerance, self._arguments.method, self._available)
+        self._image = Image(options, measurement, chosen)
 
     def normal(self, x: ArrayLike) -> np.ndarray:
         """A.H @ A @ x of amplitudes (n,). The samples are in memory meanwhile."""

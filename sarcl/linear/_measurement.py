@@ -71,6 +71,11 @@ class Measurement:
         return positions if self.seen is None else positions[self.seen]
 
     @property
+    def seen_pixels(self) -> int:
+        """Number of pixels that have a position."""
+        return self.task.grid.size if self.seen is None else len(self.seen)
+
+    @property
     def is_cut(self) -> bool:
         """Whether a beam leaves out pixels of some rows, or a window has another weight in each pixel."""
         return self.task.antennas.beam is not None or self.task.taper is not None

@@ -73,6 +73,16 @@ def test_one_direction_is_the_adjoint_of_the_other(seeds, tolerance):
         assert dot_error(A, seed) < tolerance / 10, seed
 
 
+@pytest.mark.parametrize("distance", [30.0, 10e3])
+def test_few_numbers_do_not_make_the_dot_test_worse(distance):
+    """Errors of few numbers do not cancel in sums: plans of such tasks have smaller ones."""
+    like = noise_history(n_rows=9, n_samples=2, distance=distance, bandwidth=100e6)
+    for seed in range(6):
+        points = 3 * np.random.default_rng(seed).standard_normal((1 + seed, 3))
+        A = sarcl.linear.Echoes(points, like, tolerance=2e-4)
+        assert max(dot_error(A, s) for s in range(4)) < 2e-5
+
+
 @pytest.mark.parametrize("seeds", [range(8, 16), pytest.param(range(200), marks=pytest.mark.slow)])
 def test_exact_adjoints_are_exact_to_rounding(seeds):
     for seed in seeds:
