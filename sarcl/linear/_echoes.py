@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
@@ -24,6 +25,8 @@ from ..numerics.windows import Window
 from ..opencl.choose_device import open_device
 from ..opencl.device import DeviceChoice
 from ..opencl.memory_budget import budget
+from ._antenna_gradients import KINDS as OF_ANTENNA
+from ._antenna_gradients import gradients as antenna_gradients
 from ._autograd import jax_function, rows_of_batch, torch_batch, torch_function
 from ._float32_pair import Image, PointEchoes
 from ._float64_pair import TransposedImage, choice_of
@@ -149,7 +152,7 @@ class Echoes(_Named):
             self._forward = self._float64_pair(arguments.method, known)
             self._image = Image(self._options(self.tolerance), measurement, self._forward.choice)
         else:
-            few = np.sqrt(min(measurement.seen_pixels, np.prod(measurement.shape)) / MANY)
+            few = math.sqrt(min(measurement.seen_pixels, math.prod(measurement.shape)) / MANY)
             inner = max(self.tolerance * min(max(few, LEAST_SHARE), 1.0), LEAST_TOLERANCE)
             try:
                 self._plan_in_float32(inner)
@@ -205,18 +208,32 @@ class Echoes(_Named):
         of    kinds, None: all. "amplitudes": complex (n,), A.H y, of which Re <A.H y, dx> is the change. "positions"
               of points, per m (n, 3). "heights", along the normal of a plane or the vertical, per m (n,). "tx", "rx",
               per m (n_rows, 3): where like has one antenna both move with "tx", and "rx" is refused.
-              "reference_range", per m, and "phase", of samples times exp(j phase), per rad (n_rows,)
+              "reference_range", per m, and "phase", of samples times exp(j phase), per rad (n_rows,). "pointing", of
+              rotation vectors of both antennas' axes in the scene, per rad (n_rows, 3): with antenna= alone
 
-        All but "amplitudes" are float64 and computed in float64, within about the tolerance of their norms at random
-        phases. What range windows, beams and windows over the aperture cut does not move. ValueError: unknown kinds, an
-        antenna, whose gains move, a device without float64.
+        With antenna= there are "amplitudes", "reference_range", "phase" and "pointing", in float32: gains would move
+        with positions.
+
+        Without, all but "amplitudes" are float64 and computed in float64, within about the tolerance of their norms at
+        random phases. What range windows, beams and windows over the aperture cut does not move. ValueError: unknown
+        kinds, kinds that an antenna excludes or needs, a device without float64.
         """
         is_one_antenna = self._like.rx is self._like.tx
+        has_gains = self._measurement.task.antenna is not None
         if of is None:
-            of = [kind for kind in KINDS if kind != "rx" or not is_one_antenna]
+            absent = {"pointing", "rx"} if is_one_antenna else {"pointing"}
+            of = [kind for kind in KINDS if (kind in OF_ANTENNA if has_gains else kind not in absent)]
         kinds: list[Kind] = [of] if isinstance(of, str) or not isinstance(of, Iterable) else [*of]
         for kind in kinds:
             choice("of", kind, KINDS)
+        excluded = [kind for kind in kinds if (kind not in OF_ANTENNA if has_gains else kind == "pointing")]
+        if excluded and has_gains:
+            raise ValueError(
+                f'of has "{excluded[0]}", but gains of antenna= move with it: take of={OF_ANTENNA}, or an operator '
+                "without antenna="
+            )
+        if excluded:
+            raise ValueError('of has "pointing", which needs gains that depend on directions: give antenna=')
         x, y = (self._vector(name, value, n) for name, value, n in (("x", x, 1), ("y", y, 0)))
         out = {"amplitudes": self.H @ y} if "amplitudes" in kinds else {}
         if [kind for kind in kinds if kind != "amplitudes"]:
@@ -224,11 +241,14 @@ class Echoes(_Named):
                 raise ValueError(
                     'of has "rx", but like has one antenna: ask for "tx", or make it with rx=raw.rx.copy()'
                 )
+            samples = y.reshape(self._measurement.shape)
             with self._lock:
+                if has_gains and isinstance(self._forward, PointEchoes):
+                    return out | antenna_gradients(self._forward, self._measurement, x, samples, kinds)
                 if self._gradients is None:
                     pair = self._pair or self._float64_pair()
                     self._gradients = Gradients(pair, self._measurement, self._available)
-                out |= self._gradients.of(x, y.reshape(self._measurement.shape), kinds)
+                out |= self._gradients.of(x, samples, kinds)
         return {kind: out[kind] for kind in kinds}
 
     def at(

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base import validation
+from ..base.constants import SPEED_OF_LIGHT
 from ..base.validation import instance
 from ..imaging.antenna_beam import AntennaBeam, antenna_of, is_antenna
 from ..imaging.choose_method import METHODS
@@ -69,6 +71,13 @@ class Measurement:
         """Positions of the pixels that are seen, m (n, 3)."""
         positions = self.task.grid.positions.reshape(-1, 3)
         return positions if self.seen is None else positions[self.seen]
+
+    @cached_property
+    def slope(self) -> np.ndarray:
+        """j 2 pi kappa of all samples, kappa = 2 f/c, 1/m (n_rows, n_samples)."""
+        raw = self.task.raw
+        frequencies = raw.frequency[:, None] + np.arange(raw.n_samples) * raw.frequency_step[:, None]
+        return np.asarray(4j * np.pi / SPEED_OF_LIGHT * frequencies)
 
     @property
     def seen_pixels(self) -> int:

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.cases import noise_history
+from scipy.spatial.transform import Rotation
 
 import sarcl
 from sarcl.reference.linear import gradients, matrix
@@ -97,7 +98,7 @@ def test_amplitudes_have_the_adjoint_as_gradient():
 @pytest.mark.parametrize(
     ("change", "arguments", "match"),
     [
-        ({}, {"of": "pointing"}, "of"),
+        ({}, {"of": "pointing"}, "give antenna="),
         ({}, {"of": "rx"}, "one antenna"),
         ({}, {"x": np.ones(3), "of": "tx"}, r"x has shape \(3,\)"),
         ({}, {"y": np.full(60, np.nan), "of": "tx"}, r"y\[0\]"),
@@ -108,6 +109,44 @@ def test_gradients_that_are_not_there_are_refused(change, arguments, match):
     A = sarcl.linear.Echoes(GRID, noise_history(n_rows=5, n_samples=12), **change)
     with pytest.raises(ValueError, match=match):
         A.gradients(**({"x": random_vector(42), "y": random_vector(60)} | arguments))
+
+
+@pytest.mark.parametrize("bistatic", [False, True])
+def test_gradients_of_the_pointing_of_an_antenna(bistatic, device):
+    """Against the matrix with gains of turned antennas, in float64 by differences of fourth order."""
+    like, weights = noise_history(n_rows=9, n_samples=24, distance=100.0, bandwidth=100e6), np.linspace(0.5, 1.2, 9)
+    if bistatic:
+        like = replace(like, rx=like.tx + np.array([3.0, -5.0, 1.0]))
+    antenna, points = sarcl.Antenna.gaussian(width=(0.06, 0.1)), GRID.positions.reshape(-1, 3)
+    attitude = sarcl.pointing.spotlight(sarcl.Trajectory(None, like.tx), np.array([1.0, 0.5, 0.0])).attitude
+    options = {"antenna": (antenna, attitude), "weights": weights, "tolerance": 1e-4, "device": device}
+    A = sarcl.linear.Echoes(GRID, like, **options)
+    x, y = random_vector(A.shape[1]), random_vector(A.shape[0], 1)
+    got = A.gradients(x, y)
+    assert tuple(got) == ("amplitudes", "reference_range", "phase", "pointing")
+    M, shaped = matrix(like, points) * weights[:, None, None], y.reshape(9, 24)
+
+    def value(rotation=(0.0, 0.0, 0.0)):
+        turn = Rotation.from_rotvec(rotation).as_matrix()
+        share = [
+            np.prod(
+                [antenna.gain((points - end[p]) @ (turn @ attitude[p] @ antenna.mount), 9.6e9) for end in ends], axis=0
+            )
+            for p in range(9)
+            for ends in [(like.tx, like.tx if like.rx is None else like.rx)]
+        ]
+        return (shaped.conj()[..., None] * M * np.array(share)[:, None] * x).sum(axis=(1, 2))
+
+    step = 1e-3 * np.eye(3)
+    expected = [(8 * (value(s) - value(-s)) - value(2 * s) + value(-2 * s)).real / 12e-3 for s in step]
+    assert np.linalg.norm(got["pointing"] - np.array(expected).T) < 1e-3 * np.linalg.norm(expected)
+    phase = -value().imag
+    assert np.linalg.norm(got["phase"] - phase) < 1e-3 * np.linalg.norm(phase)
+
+
+def test_antennas_with_the_same_gain_everywhere_have_no_gradient_of_pointing():
+    A = sarcl.linear.Echoes(GRID, noise_history(n_rows=5, n_samples=12), antenna=sarcl.Antenna.isotropic())
+    assert not A.gradients(random_vector(42), random_vector(60), of="pointing")["pointing"].any()
 
 
 def test_operators_at_other_values_check_them():
