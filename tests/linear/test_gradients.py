@@ -50,6 +50,34 @@ def test_gradients_are_those_of_the_closed_form(options, gate, distance, bistati
             assert np.linalg.norm(got[kind] - expected[kind]) < gate * np.linalg.norm(expected[kind]), kind
 
 
+@pytest.mark.slow
+def test_gradients_of_random_tasks():
+    """50 tasks from 30 m to orbit, of 1 to 13 rows and 1 to 24 samples."""
+    worst = [0.0, 0.0]
+    for seed in range(50):
+        random, bistatic = np.random.default_rng(seed), bool(seed % 2)
+        distance = float(random.choice([30.0, 1e3, 1e4, 7e5]))
+        n_rows, n = int(random.choice([1, 2, 13])), int(random.choice([1, 24]))
+        like = noise_history(n_rows=n_rows, n_samples=n, distance=distance, bistatic=bistatic, seed=seed)
+        x, y = random_vector(GRID.size, seed), random_vector(n_rows * n, seed + 9)
+        expected = closed_form(like, 1.0, x, y.reshape(n_rows, n))
+        for i, options in enumerate(({"tolerance": 1e-5}, {"exact": True, "tolerance": 1e-9})):
+            got = sarcl.linear.Echoes(GRID, like, **options).gradients(x, y, of=[*expected])
+            error = max(np.linalg.norm(got[k] - expected[k]) / np.linalg.norm(expected[k]) for k in expected)
+            worst[i] = max(worst[i], error)
+            assert error < (1e-4, 1e-7)[i], (seed, i)
+    print("largest relative errors of gradients, complex64 and complex128:", worst)
+
+
+def test_heights_of_a_surface_are_along_the_vertical():
+    positions = GRID.positions + np.sin(GRID.positions[..., :1]) * np.array([0.1, 0, 0.5])
+    valid = np.random.default_rng(0).random(GRID.shape) > 0.3
+    A = sarcl.linear.Echoes(sarcl.ImageGrid.points(positions, valid=valid), noise_history(n_rows=5, n_samples=12))
+    got = A.gradients(random_vector(42), random_vector(60), of=("heights", "positions"))
+    assert np.array_equal(got["heights"], got["positions"][:, 2])
+    assert (got["heights"] != 0).tolist() == valid.ravel().tolist()
+
+
 def test_gradients_hold_weights_windows_and_the_waveform(double):
     like, weights = noise_history(n_rows=13, n_samples=24, bistatic=True), np.linspace(0.2, 1.3, 13)
     waveform = sarcl.Waveform.tone(center=9.6e9, duration=3e-9)
