@@ -301,7 +301,7 @@ class Echoes(_Named):
         """A pair in float64 with the tolerance; its plan is that of a known pair, where that holds."""
         if self._measurement.task.antenna is not None:
             raise ValueError(
-                "antenna= needs gains, which are computed in float32: leave out exact=True and gradients, take a "
+                "antenna= needs gains, which are computed in float32: leave out exact=True, take a "
                 "tolerance of 1e-6 or more, and no beam= or window over the aperture with other weights in each pixel"
             )
         if method == "factorized":

@@ -140,7 +140,7 @@ def measurement_of(domain: Domain, like: PhaseHistory, arguments: Arguments) -> 
         if not is_antenna(antenna):
             raise TypeError(f"antenna is a {type(antenna).__name__}; give an Antenna, or (antenna, aim)")
         center = grid.bounds.mean(axis=0) if grid.center is None else grid.center
-        task = replace(task, antenna=antenna_of(raw, antenna, center))
+        task = replace(task, antenna=antenna_of(raw, antenna, center, "antenna"))
     pulse = like.waveform if arguments.waveform is None else arguments.waveform
     band = across[None]
     if pulse is not None:

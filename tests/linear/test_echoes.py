@@ -349,6 +349,8 @@ def test_wrong_input_is_refused(wrong, error, match):
         ({"weights": np.ones(8)}, ValueError, "weights"),
         ({"beam": sarcl.Antenna.gaussian(width=0.1)}, TypeError, "antenna="),
         ({"antenna": 0.1}, TypeError, "antenna is a float"),
+        ({"antenna": (sarcl.Antenna.gaussian(width=0.1), (0, 0))}, ValueError, r"antenna\[1\] has shape \(2,\)"),
+        ({"antenna": (sarcl.Antenna.gaussian(width=0.1), (0, 0, 1))}, ValueError, "aim it: give"),
         ({"waveform": sarcl.Waveform.chirp(center=1e9, bandwidth=1e6, duration=1e-6)}, ValueError, "waveform"),
         ({"waveform": "chirp"}, TypeError, "waveform"),
     ],
