@@ -42,19 +42,19 @@ def is_antenna(beam: object) -> TypeGuard[AntennaBeam]:
     )
 
 
-def antenna_of(raw: PhaseHistory, beam: AntennaBeam, center: np.ndarray) -> AntennaWeights:
+def antenna_of(raw: PhaseHistory, beam: AntennaBeam, center: np.ndarray, name: str = "beam") -> AntennaWeights:
     """Gains for `beam`: an Antenna, whose boresight follows `center`, m (3,), or (antenna, aim).
 
     aim  direction of the boresight, (3,) or (n_rows, 3); or attitude, (n_rows, 3, 3) as Trajectory.attitude, or a
          Trajectory of a pulse per row that has one. Transmitter and receiver have the same
-    ValueError: an aim of another shape, an attitude that is no rotation.
+    ValueError: an aim of another shape, an attitude that is no rotation; name  of the argument, in errors
     """
     if isinstance(beam, (tuple, list)) and len(beam) != 2:
-        raise ValueError(f"beam has {len(beam)} parts; give an Antenna, or (antenna, direction or attitude)")
+        raise ValueError(f"{name} has {len(beam)} parts; give an Antenna, or (antenna, direction or attitude)")
     antenna, aim = beam if isinstance(beam, (tuple, list)) else (beam, None)
     up = wgs84.vertical_at(center)
     ends = [raw.tx] if raw.is_monostatic else [raw.tx, raw.rx]
-    axes = [_axes(antenna, Trajectory(None, end), aim, center, up) for end in ends]
+    axes = [_axes(antenna, Trajectory(None, end), aim, center, up=up, name=f"{name}[1]") for end in ends]
     frequency = float(np.median(raw.frequency + raw.n_samples // 2 * raw.frequency_step))
     pair = pair_of(antenna, not raw.is_monostatic)
     return AntennaWeights(PulseGeometry(raw.tx, raw.rx), frequency, pair, (axes[0], axes[-1]))
@@ -67,7 +67,13 @@ def picked(antenna: AntennaWeights, rows: np.ndarray) -> AntennaWeights:
 
 
 def _axes(
-    antenna: Antenna, track: Trajectory, aim: ArrayLike | Trajectory | None, center: np.ndarray, up: np.ndarray | None
+    antenna: Antenna,
+    track: Trajectory,
+    aim: ArrayLike | Trajectory | None,
+    center: np.ndarray,
+    *,
+    up: np.ndarray | None,
+    name: str,
 ) -> np.ndarray:
     if aim is None:
         return antenna.axes(pointing.spotlight(track, center, up=up))
@@ -75,16 +81,16 @@ def _axes(
         if aim.attitude is None or len(aim) != len(track):
             without = "" if aim.attitude is not None else " without attitude"
             raise ValueError(
-                f"beam[1] is a Trajectory of {len(aim)} pulses{without}; give one with an attitude for each of the "
+                f"{name} is a Trajectory of {len(aim)} pulses{without}; give one with an attitude for each of the "
                 f"{len(track)} rows, such as of pointing.stripmap"
             )
         aim = aim.attitude
-    attitude = converted("beam[1]", aim, np.float64)
+    attitude = converted(name, aim, np.float64)
     if attitude.shape == (len(track), 3, 3):
         return antenna.axes(replace(track, attitude=attitude))
     if attitude.shape not in ((3,), (len(track), 3)):
         raise ValueError(
-            f"beam[1] has shape {attitude.shape}; with an Antenna give the direction of its boresight, (3,) or "
+            f"{name} has shape {attitude.shape}; with an Antenna give the direction of its boresight, (3,) or "
             f"({len(track)}, 3), its attitude, ({len(track)}, 3, 3), or a Trajectory with an attitude per row"
         )
     return antenna.axes(pointing.fixed(track, attitude, up=up))
@@ -103,7 +109,7 @@ def rounding(task: FocusingTask, radius: float) -> float:
     power = np.mean([np.abs(beam.weights(points, int(row), beam.frequency)) ** 2 for row in rows])
     if not power > 0:
         raise ValueError(
-            "the grid lies wholly out of the antenna's beam; aim it: beam=(antenna, direction), or (antenna, attitude) "
+            "the grid lies wholly out of the antenna's beam; aim it: give (antenna, direction), or (antenna, attitude) "
             "with the attitude of sarcl.pointing"
         )
     ends = np.concatenate([beam.geometry.tx[rows], beam.geometry.rx[rows]])

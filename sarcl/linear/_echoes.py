@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import math
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Literal, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.sparse import issparse
 from scipy.sparse.linalg import LinearOperator
 
+from ..base.errors import ToleranceUnreachable
 from ..base.validation import choice, converted, count, finite, number
 from ..imaging.antenna_beam import AntennaBeam
 from ..imaging.backproject_options import BackprojectOptions
@@ -22,6 +25,8 @@ from ..numerics.windows import Window
 from ..opencl.choose_device import open_device
 from ..opencl.device import DeviceChoice
 from ..opencl.memory_budget import budget
+from ._antenna_gradients import KINDS as OF_ANTENNA
+from ._antenna_gradients import gradients as antenna_gradients
 from ._autograd import jax_function, rows_of_batch, torch_batch, torch_function
 from ._float32_pair import Image, PointEchoes
 from ._float64_pair import TransposedImage, choice_of
@@ -29,6 +34,9 @@ from ._gradients import KINDS, Gradients, Kind
 from ._measurement import Arguments, Domain, measurement_of
 
 MOST_ROUNDS = 200  # of the power iteration
+# Errors of both directions are independent: <y, A x> - <A.H y, x> is smaller than they are by the root of the numbers
+# that it adds up. With fewer numbers than MANY plans are made for a smaller tolerance, which costs little there.
+MANY, LEAST_SHARE = 1000, 0.1
 
 
 class _Named(LinearOperator):
@@ -40,7 +48,11 @@ class _Named(LinearOperator):
     domain = "pixel"
 
     def dot(self, x: ArrayLike) -> np.ndarray:
-        """self @ x of a vector (n,) or of columns (n, k)."""
+        """self @ x of a vector (n,) or of columns (n, k); the product with a number or an operator is an operator."""
+        if isinstance(x, LinearOperator) or np.isscalar(x):
+            return super().dot(x)
+        if issparse(x):
+            raise TypeError(f"x is a {type(x).__name__}, and columns are dense arrays: give x.toarray()")
         x = np.asarray(x)
         if x.ndim not in (1, 2) or x.shape[0] != self.shape[1]:
             raise ValueError(
@@ -50,7 +62,11 @@ class _Named(LinearOperator):
         return np.asarray(self.matvec(x) if x.ndim == 1 else self.matmat(x))
 
     def __matmul__(self, x: ArrayLike) -> np.ndarray:
-        return super().__matmul__(x) if isinstance(x, LinearOperator) else self.dot(x)
+        return super().__matmul__(x) if np.isscalar(x) else self.dot(x)
+
+    def _matmat(self, x: np.ndarray) -> np.ndarray:
+        columns = [self.matvec(column) for column in x.T]
+        return np.stack(columns, axis=1) if columns else np.zeros((self.shape[0], 0), self.dtype)
 
 
 class _Adjoint(_Named):
@@ -131,22 +147,35 @@ class Echoes(_Named):
         self._measurement = measurement = measurement_of(domain, like, arguments)
         self._available = budget(self._device, arguments.max_bytes)
         self._gradients: Gradients | None = None
-        options = BackprojectOptions(
-            tolerance=self.tolerance, method=arguments.method, device=self._device, max_bytes=arguments.max_bytes
-        )
         self._forward: PointEchoes | TransposedImage
         if self.exact or self.tolerance < LEAST_TOLERANCE or measurement.is_cut:
             self._forward = self._float64_pair(arguments.method, known)
-            chosen = self._forward.choice
+            self._image = Image(self._options(self.tolerance), measurement, self._forward.choice)
         else:
-            chosen = options.choose(measurement.task, [self._device])
-            self._forward = PointEchoes(self._device, measurement, self.tolerance, arguments.method, self._available)
+            few = math.sqrt(min(measurement.seen_pixels, math.prod(measurement.shape)) / MANY)
+            inner = max(self.tolerance * min(max(few, LEAST_SHARE), 1.0), LEAST_TOLERANCE)
+            try:
+                self._plan_in_float32(inner)
+            except ToleranceUnreachable:
+                if inner == self.tolerance:
+                    raise
+                self._plan_in_float32(self.tolerance)
         self._pair = self._forward if isinstance(self._forward, TransposedImage) else None
-        self._image = Image(options, measurement, chosen)
-        self.predicted_error = max(self._forward.predicted_error, chosen.predicted_error)
+        self.predicted_error = max(self._forward.predicted_error, self._image.choice.predicted_error)
         dtype = np.complex128 if self.tolerance < LEAST_TOLERANCE else np.complex64
         rows, samples = measurement.shape
         super().__init__(dtype, (rows * samples, measurement.task.grid.size))
+
+    def _options(self, tolerance: float) -> BackprojectOptions:
+        method, most = self._arguments.method, self._arguments.max_bytes
+        return BackprojectOptions(tolerance=tolerance, method=method, device=self._device, max_bytes=most)
+
+    def _plan_in_float32(self, tolerance: float) -> None:
+        """Plan each direction by itself."""
+        measurement, options = self._measurement, self._options(tolerance)
+        chosen = options.choose(measurement.task, [self._device])
+        self._forward = PointEchoes(self._device, measurement, tolerance, self._arguments.method, self._available)
+        self._image = Image(options, measurement, chosen)
 
     def normal(self, x: ArrayLike) -> np.ndarray:
         """A.H @ A @ x of amplitudes (n,). The samples are in memory meanwhile."""
@@ -179,18 +208,32 @@ class Echoes(_Named):
         of    kinds, None: all. "amplitudes": complex (n,), A.H y, of which Re <A.H y, dx> is the change. "positions"
               of points, per m (n, 3). "heights", along the normal of a plane or the vertical, per m (n,). "tx", "rx",
               per m (n_rows, 3): where like has one antenna both move with "tx", and "rx" is refused.
-              "reference_range", per m, and "phase", of samples times exp(j phase), per rad (n_rows,)
+              "reference_range", per m, and "phase", of samples times exp(j phase), per rad (n_rows,). "pointing", of
+              rotation vectors of both antennas' axes in the scene, per rad (n_rows, 3): with antenna= alone
 
-        All but "amplitudes" are float64 and computed in float64, within about the tolerance of their norms at random
-        phases. What range windows, beams and windows over the aperture cut does not move. ValueError: unknown kinds, an
-        antenna, whose gains move, a device without float64.
+        With antenna= there are "amplitudes", "reference_range", "phase" and "pointing", in float32: gains would move
+        with positions.
+
+        Without, all but "amplitudes" are float64 and computed in float64, within about the tolerance of their norms at
+        random phases. What range windows, beams and windows over the aperture cut does not move. ValueError: unknown
+        kinds, kinds that an antenna excludes or needs, a device without float64.
         """
         is_one_antenna = self._like.rx is self._like.tx
+        has_gains = self._measurement.task.antenna is not None
         if of is None:
-            of = [kind for kind in KINDS if kind != "rx" or not is_one_antenna]
-        kinds: list[Kind] = [of] if isinstance(of, str) else [*of]
+            absent = {"pointing", "rx"} if is_one_antenna else {"pointing"}
+            of = [kind for kind in KINDS if (kind in OF_ANTENNA if has_gains else kind not in absent)]
+        kinds: list[Kind] = [of] if isinstance(of, str) or not isinstance(of, Iterable) else [*of]
         for kind in kinds:
             choice("of", kind, KINDS)
+        excluded = [kind for kind in kinds if (kind not in OF_ANTENNA if has_gains else kind == "pointing")]
+        if excluded and has_gains:
+            raise ValueError(
+                f'of has "{excluded[0]}", but gains of antenna= move with it: take of={OF_ANTENNA}, or an operator '
+                "without antenna="
+            )
+        if excluded:
+            raise ValueError('of has "pointing", which needs gains that depend on directions: give antenna=')
         x, y = (self._vector(name, value, n) for name, value, n in (("x", x, 1), ("y", y, 0)))
         out = {"amplitudes": self.H @ y} if "amplitudes" in kinds else {}
         if [kind for kind in kinds if kind != "amplitudes"]:
@@ -198,11 +241,14 @@ class Echoes(_Named):
                 raise ValueError(
                     'of has "rx", but like has one antenna: ask for "tx", or make it with rx=raw.rx.copy()'
                 )
+            samples = y.reshape(self._measurement.shape)
             with self._lock:
+                if has_gains and isinstance(self._forward, PointEchoes):
+                    return out | antenna_gradients(self._forward, self._measurement, x, samples, kinds)
                 if self._gradients is None:
                     pair = self._pair or self._float64_pair()
                     self._gradients = Gradients(pair, self._measurement, self._available)
-                out |= self._gradients.of(x, y.reshape(self._measurement.shape), kinds)
+                out |= self._gradients.of(x, samples, kinds)
         return {kind: out[kind] for kind in kinds}
 
     def at(
@@ -255,7 +301,7 @@ class Echoes(_Named):
         """A pair in float64 with the tolerance; its plan is that of a known pair, where that holds."""
         if self._measurement.task.antenna is not None:
             raise ValueError(
-                "antenna= needs gains, which are computed in float32: leave out exact=True and gradients, take a "
+                "antenna= needs gains, which are computed in float32: leave out exact=True, take a "
                 "tolerance of 1e-6 or more, and no beam= or window over the aperture with other weights in each pixel"
             )
         if method == "factorized":
@@ -294,7 +340,7 @@ class Echoes(_Named):
             return torch_batch(operator, x, inside, out)
         array = np.asarray(x)
         vectors, shape = rows_of_batch(array, inside, out)
-        return np.stack([operator @ one for one in vectors]).reshape(shape)
+        return np.ascontiguousarray((operator @ vectors.T).T).reshape(shape)
 
     def _matvec(self, x: np.ndarray) -> np.ndarray:
         measurement = self._measurement
@@ -315,17 +361,23 @@ class Echoes(_Named):
     def _applied(self, name: str, apply: Callable[[np.ndarray], np.ndarray], values: np.ndarray) -> np.ndarray:
         """`apply` to finite values (n,) of any size: scaled by a power of two, and the result scaled back."""
         out = self.result_type(values.dtype)
-        values = converted(name, values, out)
+        values = converted(name, values, np.result_type(values.dtype, out))
         finite(name, values)
         open_device(self._device)  # refused in a process that was forked
         numbers = values.view(values.real.dtype)
         largest = float(np.abs(numbers).max(initial=0.0))
         exponent = np.frexp(largest)[1]
-        scaled = np.ldexp(numbers, -exponent).view(values.dtype)
+        scaled = np.ldexp(numbers, -exponent).view(values.dtype).astype(out)
         with self._lock:
-            result = np.array(apply(scaled), order="C")
-        parts = result.view(result.real.dtype)
-        return np.ldexp(parts, exponent).view(result.dtype).astype(out)
+            result = np.array(apply(scaled), np.complex128, order="C")
+        parts = np.ldexp(result.view(np.float64), exponent)
+        with np.errstate(over="ignore"):
+            final = parts.view(np.complex128).astype(out)
+        if not np.isfinite(final).all() or (result.any() and not final.any()):
+            raise ValueError(
+                f"{name} has numbers to {largest:.3g}, and the result leaves the range of {out}: scale {name}"
+            )
+        return final
 
     def _adjoint(self) -> _Adjoint:
         return _Adjoint(self)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -43,6 +44,7 @@ class PointEchoes:
     """The echoes of the pixels as points: direct or factorised, as `echo` adds them.
 
     predicted_error  relative, for amplitudes with random phases and for equal ones
+    weights          gains of the antenna, or 1
     """
 
     dtype = np.complex64
@@ -69,14 +71,19 @@ class PointEchoes:
         self.plan: PointPlan = prepared.plan(weights, self._view.band, self._inner, 1)
         self.predicted_error = self.plan.predicted_error + gains
 
-    def __call__(self, amplitudes: np.ndarray) -> np.ndarray:
-        """Samples (n_rows, n_samples) complex64 of amplitudes (n,) of all pixels."""
-        measurement, nodes = self._measurement, np.array([self._view.weights.frequency])
+    @property
+    def weights(self) -> AntennaWeights:
+        return self._view.weights
+
+    def __call__(self, amplitudes: np.ndarray, weights: AntennaWeights | None = None) -> np.ndarray:
+        """Samples (n_rows, n_samples) complex64 of amplitudes (n,) of all pixels; weights  other gains than its own."""
+        measurement, nodes = self._measurement, np.array([self.weights.frequency])
+        view = self._view if weights is None else replace(self._view, weights=weights)
         seen = amplitudes if measurement.seen is None else amplitudes[measurement.seen]
         points = Points(self._points.positions, seen)
         samples = np.zeros(measurement.shape, np.complex64)
         every_row, clock = range(len(samples)), Clock()
-        leveled = self.plan.factorized_spreader(self.device, points, self._view, nodes, (0,), self._budget)
+        leveled = self.plan.factorized_spreader(self.device, points, view, nodes, (0,), self._budget)
         if leveled is not None:
             leveled.add(samples[:, None], every_row, clock, _nothing)
         if self.plan.direct is not None:
@@ -84,7 +91,7 @@ class PointEchoes:
             tiling: Any = self.plan.direct[0].tiling
             assert isinstance(tiling, HostTiling)
             tiling.refill(partial(_planes, seen[numbers]))
-            direct = self.plan.direct_spreader(self._view, nodes, self._inner, self._budget)
+            direct = self.plan.direct_spreader(view, nodes, self._inner, self._budget)
             assert direct is not None
             direct.add(samples, every_row, clock, _nothing)
         return samples

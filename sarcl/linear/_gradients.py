@@ -8,7 +8,6 @@ from typing import Literal
 import numpy as np
 
 from ..base import wgs84
-from ..base.constants import SPEED_OF_LIGHT
 from ..imaging.engine import RowProfiles
 from ..imaging.float64.plan import CHUNK
 from ..imaging.pixel_taper import WEIGHT_BUFFERS
@@ -16,8 +15,8 @@ from ..opencl.launch_numbers import launch_numbers
 from ._float64_pair import ROWS, TransposedImage
 from ._measurement import Measurement
 
-Kind = Literal["amplitudes", "positions", "heights", "tx", "rx", "reference_range", "phase"]
-KINDS: tuple[Kind, ...] = ("amplitudes", "positions", "heights", "tx", "rx", "reference_range", "phase")
+Kind = Literal["amplitudes", "positions", "heights", "tx", "rx", "reference_range", "phase", "pointing"]
+KINDS: tuple[Kind, ...] = ("amplitudes", "positions", "heights", "tx", "rx", "reference_range", "phase", "pointing")
 BOTH = 3  # TOWARDS of kernels/point_path_float64.clh: the mean of the unit vectors to both antennas
 
 
@@ -34,9 +33,7 @@ class Gradients:
 
     def __init__(self, pair: TransposedImage, measurement: Measurement, budget: float) -> None:
         self.pair, self.measurement, self.budget = pair, measurement, budget
-        raw, plan = measurement.task.raw, pair.plan
-        frequencies = raw.frequency[:, None] + np.arange(raw.n_samples) * raw.frequency_step[:, None]
-        self.slope = 4j * np.pi / SPEED_OF_LIGHT * frequencies  # j 2 pi kappa, 1/m
+        plan, self.slope = pair.plan, measurement.slope
         self.profiles = RowProfiles(pair.device, pair.task, plan.interpolator, plan.length, dtype=np.complex128)
 
     def of(self, x: np.ndarray, y: np.ndarray, kinds: Sequence[Kind]) -> dict[str, np.ndarray]:

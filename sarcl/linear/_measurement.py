@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base import validation
+from ..base.constants import SPEED_OF_LIGHT
 from ..base.validation import instance
 from ..imaging.antenna_beam import AntennaBeam, antenna_of, is_antenna
 from ..imaging.choose_method import METHODS
@@ -70,6 +72,18 @@ class Measurement:
         positions = self.task.grid.positions.reshape(-1, 3)
         return positions if self.seen is None else positions[self.seen]
 
+    @cached_property
+    def slope(self) -> np.ndarray:
+        """j 2 pi kappa of all samples, kappa = 2 f/c, 1/m (n_rows, n_samples)."""
+        raw = self.task.raw
+        frequencies = raw.frequency[:, None] + np.arange(raw.n_samples) * raw.frequency_step[:, None]
+        return np.asarray(4j * np.pi / SPEED_OF_LIGHT * frequencies)
+
+    @property
+    def seen_pixels(self) -> int:
+        """Number of pixels that have a position."""
+        return self.task.grid.size if self.seen is None else len(self.seen)
+
     @property
     def is_cut(self) -> bool:
         """Whether a beam leaves out pixels of some rows, or a window has another weight in each pixel."""
@@ -126,7 +140,7 @@ def measurement_of(domain: Domain, like: PhaseHistory, arguments: Arguments) -> 
         if not is_antenna(antenna):
             raise TypeError(f"antenna is a {type(antenna).__name__}; give an Antenna, or (antenna, aim)")
         center = grid.bounds.mean(axis=0) if grid.center is None else grid.center
-        task = replace(task, antenna=antenna_of(raw, antenna, center))
+        task = replace(task, antenna=antenna_of(raw, antenna, center, "antenna"))
     pulse = like.waveform if arguments.waveform is None else arguments.waveform
     band = across[None]
     if pulse is not None:

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.cases import noise_history
+from scipy.spatial.transform import Rotation
 
 import sarcl
 from sarcl.reference.linear import gradients, matrix
@@ -47,6 +48,34 @@ def test_gradients_are_those_of_the_closed_form(options, gate, distance, bistati
             assert got[kind].shape == expected[kind].shape
             assert got[kind].dtype == (np.float64 if kind != "amplitudes" else np.result_type(got[kind]))
             assert np.linalg.norm(got[kind] - expected[kind]) < gate * np.linalg.norm(expected[kind]), kind
+
+
+@pytest.mark.slow
+def test_gradients_of_random_tasks():
+    """50 tasks from 30 m to orbit, of 1 to 13 rows and 1 to 24 samples."""
+    worst = [0.0, 0.0]
+    for seed in range(50):
+        random, bistatic = np.random.default_rng(seed), bool(seed % 2)
+        distance = float(random.choice([30.0, 1e3, 1e4, 7e5]))
+        n_rows, n = int(random.choice([1, 2, 13])), int(random.choice([1, 24]))
+        like = noise_history(n_rows=n_rows, n_samples=n, distance=distance, bistatic=bistatic, seed=seed)
+        x, y = random_vector(GRID.size, seed), random_vector(n_rows * n, seed + 9)
+        expected = closed_form(like, 1.0, x, y.reshape(n_rows, n))
+        for i, options in enumerate(({"tolerance": 1e-5}, {"exact": True, "tolerance": 1e-9})):
+            got = sarcl.linear.Echoes(GRID, like, **options).gradients(x, y, of=[*expected])
+            error = max(np.linalg.norm(got[k] - expected[k]) / np.linalg.norm(expected[k]) for k in expected)
+            worst[i] = max(worst[i], error)
+            assert error < (1e-4, 1e-7)[i], (seed, i)
+    print("largest relative errors of gradients, complex64 and complex128:", worst)
+
+
+def test_heights_of_a_surface_are_along_the_vertical():
+    positions = GRID.positions + np.sin(GRID.positions[..., :1]) * np.array([0.1, 0, 0.5])
+    valid = np.random.default_rng(0).random(GRID.shape) > 0.3
+    A = sarcl.linear.Echoes(sarcl.ImageGrid.points(positions, valid=valid), noise_history(n_rows=5, n_samples=12))
+    got = A.gradients(random_vector(42), random_vector(60), of=("heights", "positions"))
+    assert np.array_equal(got["heights"], got["positions"][:, 2])
+    assert (got["heights"] != 0).tolist() == valid.ravel().tolist()
 
 
 def test_gradients_hold_weights_windows_and_the_waveform(double):
@@ -97,7 +126,7 @@ def test_amplitudes_have_the_adjoint_as_gradient():
 @pytest.mark.parametrize(
     ("change", "arguments", "match"),
     [
-        ({}, {"of": "pointing"}, "of"),
+        ({}, {"of": "pointing"}, "give antenna="),
         ({}, {"of": "rx"}, "one antenna"),
         ({}, {"x": np.ones(3), "of": "tx"}, r"x has shape \(3,\)"),
         ({}, {"y": np.full(60, np.nan), "of": "tx"}, r"y\[0\]"),
@@ -108,6 +137,44 @@ def test_gradients_that_are_not_there_are_refused(change, arguments, match):
     A = sarcl.linear.Echoes(GRID, noise_history(n_rows=5, n_samples=12), **change)
     with pytest.raises(ValueError, match=match):
         A.gradients(**({"x": random_vector(42), "y": random_vector(60)} | arguments))
+
+
+@pytest.mark.parametrize("bistatic", [False, True])
+def test_gradients_of_the_pointing_of_an_antenna(bistatic, device):
+    """Against the matrix with gains of turned antennas, in float64 by differences of fourth order."""
+    like, weights = noise_history(n_rows=9, n_samples=24, distance=100.0, bandwidth=100e6), np.linspace(0.5, 1.2, 9)
+    if bistatic:
+        like = replace(like, rx=like.tx + np.array([3.0, -5.0, 1.0]))
+    antenna, points = sarcl.Antenna.gaussian(width=(0.06, 0.1)), GRID.positions.reshape(-1, 3)
+    attitude = sarcl.pointing.spotlight(sarcl.Trajectory(None, like.tx), np.array([1.0, 0.5, 0.0])).attitude
+    options = {"antenna": (antenna, attitude), "weights": weights, "tolerance": 1e-4, "device": device}
+    A = sarcl.linear.Echoes(GRID, like, **options)
+    x, y = random_vector(A.shape[1]), random_vector(A.shape[0], 1)
+    got = A.gradients(x, y)
+    assert tuple(got) == ("amplitudes", "reference_range", "phase", "pointing")
+    M, shaped = matrix(like, points) * weights[:, None, None], y.reshape(9, 24)
+
+    def value(rotation=(0.0, 0.0, 0.0)):
+        turn = Rotation.from_rotvec(rotation).as_matrix()
+        share = [
+            np.prod(
+                [antenna.gain((points - end[p]) @ (turn @ attitude[p] @ antenna.mount), 9.6e9) for end in ends], axis=0
+            )
+            for p in range(9)
+            for ends in [(like.tx, like.tx if like.rx is None else like.rx)]
+        ]
+        return (shaped.conj()[..., None] * M * np.array(share)[:, None] * x).sum(axis=(1, 2))
+
+    step = 1e-3 * np.eye(3)
+    expected = [(8 * (value(s) - value(-s)) - value(2 * s) + value(-2 * s)).real / 12e-3 for s in step]
+    assert np.linalg.norm(got["pointing"] - np.array(expected).T) < 1e-3 * np.linalg.norm(expected)
+    phase = -value().imag
+    assert np.linalg.norm(got["phase"] - phase) < 1e-3 * np.linalg.norm(phase)
+
+
+def test_antennas_with_the_same_gain_everywhere_have_no_gradient_of_pointing():
+    A = sarcl.linear.Echoes(GRID, noise_history(n_rows=5, n_samples=12), antenna=sarcl.Antenna.isotropic())
+    assert not A.gradients(random_vector(42), random_vector(60), of="pointing")["pointing"].any()
 
 
 def test_operators_at_other_values_check_them():

@@ -1,12 +1,15 @@
-"""What the operator is for: sparse imaging, autofocus by gradient, and positions to the Cramer-Rao bound."""
+"""What the operator is for: sparse imaging, autofocus by gradient, positions and heights to the Cramer-Rao bound."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from helpers.cases import noise_on
 from scipy.ndimage import maximum_filter
 from scipy.optimize import minimize
+from scipy.sparse.linalg import cg
 
 import sarcl
 from sarcl.reference.linear import matrix
@@ -61,6 +64,50 @@ def test_a_point_is_found_to_the_cramer_rao_bound():
     rms = np.sqrt(np.mean(np.square(errors), axis=0))
     print("rms over bound", rms / bound)
     assert np.all(np.abs(rms / bound - 1) < 0.15)
+
+
+def test_heights_of_a_hill_are_found_from_two_passes():
+    """L band, 100 m apart across the line of sight: a height of 8 m is a cycle, and the hill of 3 m is 2.4 rad."""
+    along = np.linspace(-300, 300, 20)[:, None] * np.array([0, 1.0, 0])
+    first = np.array([-7e3, 0, 7e3])
+    second = first + 100 * np.array([1, 0, 1]) / np.sqrt(2)
+    like = noise_on(np.concatenate([first + along, second + along]), n_samples=24, bandwidth=80e6)
+    like = replace(like, frequency=np.full(40, 1.26e9))
+    flat, up = sarcl.ImageGrid.plane(shape=(12, 12), spacing=3.0).positions.reshape(-1, 3), np.array([0, 0, 1.0])
+    hill = 3 * np.exp(-(flat[:, 0] ** 2 + flat[:, 1] ** 2) / (2 * 8.0**2))
+    random, n = np.random.default_rng(0), len(flat)
+    x = (random.standard_normal(n) + 1j * random.standard_normal(n)) / np.sqrt(2)
+    M, shift = matrix(like, flat + hill[:, None] * up).reshape(-1, n), 1e-4 * up
+    slope = [matrix(like, flat + hill[:, None] * up + s * shift).reshape(-1, n) for s in (1, -1)]
+    clean = M @ x
+    sigma = np.sqrt(np.mean(np.abs(clean) ** 2) / 100)
+    data = clean + sigma / np.sqrt(2) * (random.standard_normal(len(M)) + 1j * random.standard_normal(len(M)))
+
+    def cosines(k):
+        c = np.cos(np.outer(np.arange(k), (np.arange(12) + 0.5) * np.pi / 12))
+        return np.einsum("ia,jb->abij", c, c).reshape(n, k * k)
+
+    basis = cosines(7)
+    J = np.concatenate([M, 1j * M, (slope[0] - slope[1]) / 2e-4 * x @ basis], axis=1)
+    covariance = np.linalg.inv(2 / sigma**2 * (J.conj().T @ J).real)[2 * n :, 2 * n :]
+    bound = np.sqrt(np.mean(np.einsum("pi,ij,pj->p", basis, covariance, basis)))
+    on_plane, amplitudes = sarcl.linear.Echoes(flat, like, exact=True, tolerance=1e-6), np.zeros(n, complex)
+
+    def misfit(coefficients, basis):
+        nonlocal amplitudes
+        A = on_plane.at(positions=flat + (basis @ coefficients)[:, None] * up)
+        amplitudes, _ = cg(A.H @ A, A.H @ data, x0=amplitudes, rtol=1e-6, maxiter=50)
+        rest = A @ amplitudes - data
+        of_heights = 2 * A.gradients(amplitudes, rest, of="heights")["heights"]
+        return np.linalg.norm(rest) ** 2 / sigma**2, of_heights @ basis / sigma**2
+
+    heights = np.zeros(n)
+    for k in (1, 2, 3, 5, 7):  # from slow changes to fast ones
+        start = np.linalg.lstsq(cosines(k), heights, rcond=None)[0]
+        heights = cosines(k) @ minimize(misfit, start, args=(cosines(k),), jac=True, method="L-BFGS-B").x
+    error = np.sqrt(np.mean((heights - hill) ** 2))
+    print("rms of the heights, m", error, "bound", bound)
+    assert error < 2 * bound
 
 
 def test_l1_of_a_quarter_of_the_pulses_finds_what_all_of_them_show(gotcha):
