@@ -23,8 +23,9 @@ typedef struct {
 // Adds (re + j im) w[k] to samples j + k, lane by lane: lanes may meet in one sample.
 static inline void add_taps(__global double *row, lv j, const dv *w, dv re, dv im) {
 #if VW == 1
+    __global double *q = row + 2 * j;
 #pragma unroll
-    for (int k = 0; k < TAPS; k++) vstore2(vload2(j + k, row) + (double2)(w[k] * re, w[k] * im), j + k, row);
+    for (int k = 0; k < TAPS; k++) vstore2(vload2(k, q) + (double2)(w[k] * re, w[k] * im), k, q);
 #else
     long at[VW];
     double a[VW], b[VW], lane[TAPS][VW];
