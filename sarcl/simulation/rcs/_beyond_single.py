@@ -84,6 +84,7 @@ def add_beyond_single_reflections(task: RcsTask, out: np.ndarray) -> None:
             out[rows] += values.transpose(0, 2, 1)
     bounced = BounceScene.of(scene, options.bounces, share)
     if bounced is not None:
+        bounced.refuse_many(tx, rx)
         for rows, values in BounceSpreader(bounced, view).exactly(np.arange(len(tx)), task.frequencies):
             out[rows] += values.transpose(0, 2, 1)
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from helpers.cases import planned_within
 
 import sarcl
 from sarcl.base.errors import NothingSeen
@@ -161,8 +162,9 @@ def test_what_is_at_the_edge_of_a_beam_shades_it_at_all_pulses_of_a_block():
 
 def limit(monkeypatch, **limits):
     """Let beams be looked for within other limits."""
-    prepare = BounceScene.of
-    monkeypatch.setattr(BounceScene, "of", lambda *given: replace(prepare(*given), limits=BeamLimits(**limits)))
+    prepare = vars(BounceScene)["of"].__func__
+    function = classmethod(lambda *values: replace(prepare(*values), limits=BeamLimits(**limits)))
+    monkeypatch.setattr(BounceScene, "of", function)
 
 
 @pytest.mark.parametrize("bounces", [2, 3])
@@ -186,9 +188,34 @@ def test_shadows_on_single_facets_looked_at_first_change_nothing(bounces, monkey
         assert np.linalg.norm(first - second) <= 1e-6 * np.linalg.norm(second)
 
 
-def test_too_many_pairs_of_facets_are_refused_with_a_remedy(monkeypatch):
-    limit(monkeypatch, most_pairs=2)
-    with pytest.raises(
-        MemoryError, match=r"may reflect to one another in about .* ways.*fewer bounces, a coarser mesh"
-    ):
-        echo(sarcl.Scene.facets(halves(PLATES)))
+@pytest.mark.parametrize("prepared_seconds", [0.0, np.inf])
+def test_too_many_pairs_of_facets_are_refused_by_a_plan_and_a_run_alike(monkeypatch, prepared_seconds):
+    limit(monkeypatch, most_ways=1)
+    limits = {"prepared_seconds": prepared_seconds, "prepared_share": 0.0}
+    options = {"reference": (0.5, 0.5, 0.5), "range_window": (-5, 5), "tolerance": 1e-2, "bounces": 2}
+    scene, texts = sarcl.Scene.facets(halves(PLATES)), []
+    plan = planned_within(limits, sarcl.echo, scene, CHIRP, LOOK, **options)
+    for call in (plan.forecast, lambda: echo(scene)):
+        with pytest.raises(MemoryError, match=r"about 2e\+00 ways, more than the 1e.*fewer bounces, a coarser") as said:
+            call()
+        texts.append(str(said.value))
+    assert texts[0] == texts[1]
+
+
+@pytest.mark.parametrize("most_pairs", [1, 40])
+def test_beams_in_many_blocks_have_the_echoes_of_one_block_and_few_weak_ones(monkeypatch, most_pairs):
+    """Concrete blocks, whose beams of the last order are left out as far as a share of the tolerance goes."""
+    rng = np.random.default_rng(3)
+    places = rng.uniform((0, 0, 0.05), (1.5, 1.5, 0.6), (4, 3))
+    triangles = np.concatenate([halves(PLATES), *(block(tuple(p), tuple(p + 0.3)) for p in places)])
+    scene = sarcl.Scene.facets(triangles, material="concrete")
+    options = {"bounces": 3, "reference": (0.5, 0.5, 0.5), "range_window": (-9, 9), "check": False}
+    exact = sarcl.echo(scene, CHIRP, LOOK, tolerance=1e-4, **options).samples
+    skipped, pairs = [], []
+    for most in (most_pairs, 10**7):
+        limit(monkeypatch, most_pairs=most)
+        raw = sarcl.echo(scene, CHIRP, LOOK, tolerance=3e-1, **options)
+        skipped.append(raw.report.contributions_skipped["weak reflections"])
+        pairs.append(raw.report.contributions_done + sum(raw.report.contributions_skipped.values()))
+        assert np.linalg.norm(raw.samples - exact) <= raw.report.predicted_error * np.linalg.norm(exact)
+    assert 0 < skipped[0] <= 1.2 * skipped[1] and abs(pairs[0] - pairs[1]) <= 0.05 * pairs[1]
