@@ -226,10 +226,12 @@ def first_facets(surfaces: Surfaces, tx: np.ndarray, turn: float) -> tuple[np.nd
     facets = facets[(sine > -turn) | surfaces.two_sided[facets]]
 
     def reached_from(block: slice) -> tuple[np.ndarray, int]:
-        some = facets[block]
-        image = mirrored(np.repeat(middle[None], len(some), axis=0), surfaces.normals[some], surfaces.centers[some])
-        which = _reached(surfaces, some, *surfaces.polygons[some].spheres, image, turn)[0]
-        return some[np.unique(which)], len(which)
+        members = facets[block]
+        image = mirrored(
+            np.repeat(middle[None], len(members), axis=0), surfaces.normals[members], surfaces.centers[members]
+        )
+        which = _reached(surfaces, members, *surfaces.polygons[members].spheres, image, turn)[0]
+        return members[np.unique(which)], len(which)
 
     parts = list(halved(len(facets), reached_from))
     return np.concatenate([part for part, _ in parts]), sum(number for _, number in parts)

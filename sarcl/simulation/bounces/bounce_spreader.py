@@ -70,12 +70,12 @@ class BounceScene:
             if on is not None and not mirrors[on].any():
                 ground = Ground(scene.triangles[on & is_solid] - origin, scene.heights, origin)
                 is_solid &= ~on
-        some = np.flatnonzero(is_solid)
-        triangles, mirrors = scene.triangles[some], mirrors[some]
-        height = np.hypot(np.where(mirrors, fine[some], 0.0), scene.roughness[some])
-        coatings = Coatings(scene.material[some], scene.materials, scene.reflectivity[some], height)
+        solids = np.flatnonzero(is_solid)
+        triangles, mirrors = scene.triangles[solids], mirrors[solids]
+        height = np.hypot(np.where(mirrors, fine[solids], 0.0), scene.roughness[solids])
+        coatings = Coatings(scene.material[solids], scene.materials, scene.reflectivity[solids], height)
         polygons, is_closed = Polygons.of(triangles - origin), closed(triangles)
-        surfaces = Surfaces(polygons, scene.two_sided[some], mirrors, is_closed, ground=ground)
+        surfaces = Surfaces(polygons, scene.two_sided[solids], mirrors, is_closed, ground=ground)
         limits = BeamLimits(most_pairs=int(min(MOST_PAIRS, max_bytes / PAIR_BYTES)))
         return cls(surfaces, coatings, origin, bounces, tolerance, limits)
 
@@ -100,16 +100,18 @@ class BounceScene:
         """These facets, triangles of one plane and material joined where together they are convex."""
         surfaces, coatings = self.surfaces, self.coatings
         joins = surfaces.mirrors | ((~surfaces.mirrors).sum() <= MOST_SHADING)
-        some, single = np.flatnonzero(joins), np.flatnonzero(~joins)
+        joinable, single = np.flatnonzero(joins), np.flatnonzero(~joins)
         alike = coatings.material, coatings.reflectivity, coatings.height, surfaces.two_sided, surfaces.mirrors
-        groups = np.unique(np.stack([values[some] for values in alike], axis=1), axis=0, return_inverse=True)[1].ravel()
-        polygons, first = joined_facets(surfaces.corners[some], groups, surfaces.diagonal)
+        groups = np.unique(np.stack([values[joinable] for values in alike], axis=1), axis=0, return_inverse=True)[
+            1
+        ].ravel()
+        polygons, first = joined_facets(surfaces.corners[joinable], groups, surfaces.diagonal)
         polygons = joined([polygons, surfaces.polygons[single]]) if len(single) else polygons
-        polygons, some = tiles(polygons, np.append(some[first], single), surfaces.diagonal)
+        polygons, first = tiles(polygons, np.append(joinable[first], single), surfaces.diagonal)
         coatings = Coatings(
-            coatings.material[some], coatings.materials, coatings.reflectivity[some], coatings.height[some]
+            coatings.material[first], coatings.materials, coatings.reflectivity[first], coatings.height[first]
         )
-        flags = surfaces.two_sided[some], surfaces.mirrors[some], surfaces.closed[some]
+        flags = surfaces.two_sided[first], surfaces.mirrors[first], surfaces.closed[first]
         return Surfaces(polygons, *flags, self.limits.most_pairs, surfaces.ground), coatings
 
     def narrow_share(self, wavelength: float) -> float:
@@ -228,8 +230,8 @@ class BounceSpreader:
         """Triangles that are together the pieces of beams, small enough for plane waves."""
         corners = pieces.corners
         fans = [(i, np.flatnonzero(pieces.count > i + 1)) for i in range(1, corners.shape[1] - 1)]
-        triangles = np.concatenate([corners[some][:, [0, i, i + 1]] for i, some in fans])
-        of = np.concatenate([of[some] for _, some in fans])
+        triangles = np.concatenate([corners[rows][:, [0, i, i + 1]] for i, rows in fans])
+        of = np.concatenate([of[rows] for _, rows in fans])
         parts, numbers = [], []
         while len(triangles):
             center = triangles.mean(axis=1)
@@ -255,13 +257,13 @@ class BounceSpreader:
 
     def _late(self, triangles: Facets, beams: np.ndarray, pulses: np.ndarray) -> tuple[float, float]:
         """Power of beams of these numbers (n,) in a sample, and the latest half path about the reference, m."""
-        some = triangles.chosen(np.flatnonzero(np.isin(triangles.of, beams)))
-        delta = some.path / 2 - self.view.antennas.reference_range[pulses[some.beams.pulse]]
+        late = triangles.chosen(np.flatnonzero(np.isin(triangles.of, beams)))
+        delta = late.path / 2 - self.view.antennas.reference_range[pulses[late.beams.pulse]]
         frequency = float(np.median(self.view.frequencies))
-        sent = some.shapes(np.array([frequency]), self._coatings) * self._weighted(some, pulses, frequency)
+        sent = late.shapes(np.array([frequency]), self._coatings) * self._weighted(late, pulses, frequency)
         sent *= np.exp(-4j * np.pi * frequency / SPEED_OF_LIGHT * delta)[:, None]
-        sums = np.zeros((int(some.of.max()) + 1, sent.shape[1]), np.complex128)
-        np.add.at(sums, some.of, sent)
+        sums = np.zeros((int(late.of.max()) + 1, sent.shape[1]), np.complex128)
+        np.add.at(sums, late.of, sent)
         return float((np.abs(sums) ** 2).sum()), float(delta.max())
 
     def _add(self, out: np.ndarray, pulses: np.ndarray, frequencies: np.ndarray, facets: Facets, exact: bool) -> None:
@@ -273,10 +275,10 @@ class BounceSpreader:
         at = chebyshev(band.mean(), float(np.ptp(band)), NODES) if varies and np.ptp(band) else band[:1]
         matrices = np.stack([self._weighted(facets, pulses, float(f)) for f in at], axis=1)
 
-        def amplitudes(some: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+        def amplitudes(rows: np.ndarray, wanted: np.ndarray) -> np.ndarray:
             basis = lagrange(at, wanted)
-            shapes = facets.chosen(some).shapes(wanted, coatings)
-            return np.asarray(shapes[:, :, None] * np.einsum("nmj,mf->nfj", matrices[some], basis))
+            shapes = facets.chosen(rows).shapes(wanted, coatings)
+            return np.asarray(shapes[:, :, None] * np.einsum("nmj,mf->nfj", matrices[rows], basis))
 
         error = PROFILES * scene.tolerance
         extra = 1 + (NODES - 1) * varies + 4 * bool(coatings.height.any())
@@ -293,7 +295,7 @@ class BounceSpreader:
             return out
         leaving = facets.rays()[0] * np.linalg.norm(facets.center - beams.apex, axis=1)[:, None]
         for row in np.unique(beams.pulse).tolist():
-            some = np.flatnonzero(beams.pulse == row)
-            ways = leaving[some], (facets.center - facets.rx)[some]
-            out[some] *= view.weights.of_paths(*ways, int(pulses[row]), frequency)[:, None]
+            rows = np.flatnonzero(beams.pulse == row)
+            ways = leaving[rows], (facets.center - facets.rx)[rows]
+            out[rows] *= view.weights.of_paths(*ways, int(pulses[row]), frequency)[:, None]
         return out
