@@ -157,7 +157,7 @@ def _beyond_single(planned: PlannedEchoes) -> float:
         seen.antennas, seen.weights, frequencies, bandwidth, request.polarizations, request.vertical, request.gated
     )
     begin = time.perf_counter()
-    bounced = BounceScene.of(seen.scene, request.bounces, scene.error_budget, request.host)
+    bounced = BounceScene.of(seen.scene, request.bounces, scene.error_budget, center + bandwidth / 2, request.host)
     if bounced is not None:
         bounced.refuse_many(seen.antennas.tx, seen.antennas.rx)
     edges = PreparedEdges.of(request, seen)

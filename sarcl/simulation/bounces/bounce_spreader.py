@@ -36,6 +36,7 @@ ROOT_MEAN_SQUARE = 0.2
 DIRECTION = 0.5  # rad over the root of the tolerance: by which directions change over a triangle
 PROFILES = 1 / 300  # of the tolerance: error of sums over frequencies
 MOST_SHADING = 20_000  # facets that only cast shadows, from which on joining them would take longer than it saves
+FLATNESS = 0.25  # rad over the tolerance: phases of corners of a flat part, by their distances from its plane
 NARROW = 0.5  # share of the area in facets narrower than a wavelength from which on there is a warning
 NODES = 6  # frequencies at which matrices of dispersive materials are computed
 
@@ -45,6 +46,7 @@ class BounceScene:
     """Facets of a scene that reflect to one another, about `origin`, m (3,).
 
     bounces    of the last order that is followed;  tolerance  relative to the bounced echoes at random phases
+    flat       m: parts of a mesh are joined where their corners are no farther from one plane
     """
 
     surfaces: Surfaces
@@ -52,11 +54,17 @@ class BounceScene:
     origin: np.ndarray
     bounces: int
     tolerance: float
+    flat: float
     limits: BeamLimits = field(default_factory=BeamLimits)
 
     @classmethod
-    def of(cls, scene: Scene, bounces: int, tolerance: float, max_bytes: float = np.inf) -> BounceScene | None:
-        """The facets of a scene, None where no two of them reflect; max_bytes  for beams at a time."""
+    def of(
+        cls, scene: Scene, bounces: int, tolerance: float, frequency: float, max_bytes: float = np.inf
+    ) -> BounceScene | None:
+        """The facets of a scene, None where no two of them reflect.
+
+        frequency  the highest, Hz;  max_bytes  for beams at a time
+        """
         if bounces == 1:
             return None
         fine = np.array([m.height for m in scene.materials])[scene.material]
@@ -76,8 +84,9 @@ class BounceScene:
         coatings = Coatings(scene.material[solids], scene.materials, scene.reflectivity[solids], height)
         polygons, is_closed = Polygons.of(triangles - origin), closed(triangles)
         surfaces = Surfaces(polygons, scene.two_sided[solids], mirrors, is_closed, ground=ground)
+        flat = FLATNESS * tolerance * SPEED_OF_LIGHT / frequency / (4 * np.pi)
         limits = BeamLimits(most_pairs=int(min(MOST_PAIRS, max_bytes / PAIR_BYTES)))
-        return cls(surfaces, coatings, origin, bounces, tolerance, limits)
+        return cls(surfaces, coatings, origin, bounces, tolerance, flat, limits)
 
     def refuse_many(self, tx: np.ndarray, rx: np.ndarray) -> None:
         """MemoryError where facets may reflect to one another in too many ways, as seen from antennas, m (n, 3), at the
@@ -105,7 +114,7 @@ class BounceScene:
         groups = np.unique(np.stack([values[joinable] for values in alike], axis=1), axis=0, return_inverse=True)[
             1
         ].ravel()
-        polygons, first = joined_facets(surfaces.corners[joinable], groups, surfaces.diagonal)
+        polygons, first = joined_facets(surfaces.corners[joinable], groups, surfaces.diagonal, self.flat)
         polygons = joined([polygons, surfaces.polygons[single]]) if len(single) else polygons
         polygons, first = tiles(polygons, np.append(joinable[first], single), surfaces.diagonal)
         coatings = Coatings(

@@ -133,6 +133,32 @@ def test_flat_parts_with_a_hole_or_t_junctions_are_joined_to_few_facets():
     )
 
 
+def test_flat_parts_rounded_to_float32_are_joined_wherever_they_stand():
+    c, s = np.cos(0.4), np.sin(0.4)
+    turn = np.array([(c, -s, 0), (s, c, 0), (0, 0, 1)]) @ np.array([(1, 0, 0), (0, c, -s), (0, s, c)])
+    exact = dihedral_cut(6).triangles @ turn.T
+    place, options = np.array([1e3, 0, 0]), {"range_window": (-5, 5), "tolerance": 1e-2, "check": False, "bounces": 2}
+    track = sarcl.Trajectory(None, LOOK.positions @ turn.T + place)
+    flat, rounded = (
+        sarcl.echo(sarcl.Scene.facets(one + place), CHIRP, track, reference=place, **options)
+        for one in (exact, exact.astype(np.float32).astype(float))
+    )
+    assert number_of_two(rounded) == number_of_two(flat) == 2
+    assert np.linalg.norm(rounded.samples - flat.samples) <= 1e-3 * np.linalg.norm(flat.samples)
+
+
+def test_a_gently_bent_mesh_is_joined_no_farther_than_the_tolerance_allows():
+    bent = dihedral_cut(12).triangles.copy()
+    bent[: 144 * 2, :, 2] += (
+        2e-4 * bent[: 144 * 2, :, 0] ** 2
+    )  # neighbours differ by 3e-6 m, all by 5e-5 m from a plane
+    scene = sarcl.Scene.facets(bent)
+    options = {"reference": (0.5, 0.5, 0.5), "range_window": (-5, 5), "check": False, "bounces": 2}
+    loose, fine = (sarcl.echo(scene, CHIRP, LOOK, tolerance=t, **options) for t in (1e-1, 1e-3))
+    assert number_of_two(loose) < number_of_two(fine)
+    assert np.linalg.norm(loose.samples - fine.samples) <= 1e-1 * np.linalg.norm(fine.samples)
+
+
 def test_a_mesh_of_facets_narrower_than_a_wavelength_is_said():
     bent = dihedral_cut(40).triangles + 0.0
     bent[..., 2] += 0.05 * bent[..., 0] ** 2
