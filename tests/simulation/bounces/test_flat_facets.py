@@ -245,3 +245,16 @@ def test_beams_in_many_blocks_have_the_echoes_of_one_block_and_few_weak_ones(mon
         pairs.append(raw.report.contributions_done + sum(raw.report.contributions_skipped.values()))
         assert np.linalg.norm(raw.samples - exact) <= raw.report.predicted_error * np.linalg.norm(exact)
     assert 0 < skipped[0] <= 1.2 * skipped[1] and abs(pairs[0] - pairs[1]) <= 0.05 * pairs[1]
+
+
+@pytest.mark.filterwarnings("ignore:mesh too fine")
+def test_blocks_of_beams_share_one_sum_of_what_is_left_out(monkeypatch):
+    """120 random facets: about 10 beams fit into the sum of bounds, twice as many where each block has its own."""
+    rng = np.random.default_rng(0)
+    triangles = rng.uniform(-1.5, 1.5, (120, 1, 3)) + rng.uniform(-0.5, 0.5, (120, 3, 3))
+    scene = sarcl.Scene.facets(triangles, two_sided=True, material="concrete")
+    wave = sarcl.Waveform.chirp(center=1.1e9, bandwidth=50e6, duration=1e-6)
+    options = {"reference": (0, 0, 0), "range_window": (-20, 20), "tolerance": 3e-1, "check": False}
+    limit(monkeypatch, most_pairs=30)
+    raw = sarcl.echo(scene, wave, LOOK, bounces=2, **options)
+    assert 0 < raw.report.contributions_skipped["weak reflections"] < 18
