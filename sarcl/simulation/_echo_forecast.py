@@ -157,7 +157,10 @@ def _beyond_single(planned: PlannedEchoes) -> float:
         seen.antennas, seen.weights, frequencies, bandwidth, request.polarizations, request.vertical, request.gated
     )
     begin = time.perf_counter()
-    bounced, edges = BounceScene.of(seen.scene, request.bounces, scene.error_budget), PreparedEdges.of(request, seen)
+    bounced = BounceScene.of(seen.scene, request.bounces, scene.error_budget, center + bandwidth / 2, request.host)
+    if bounced is not None:
+        bounced.refuse_many(seen.antennas.tx, seen.antennas.rx)
+    edges = PreparedEdges.of(request, seen)
     spreaders: list[BounceSpreader | EdgeEchoes] = [] if bounced is None else [BounceSpreader(bounced, view)]
     spreaders += [] if edges is None else [EdgeEchoes(edges, view)]
     seconds = time.perf_counter() - begin

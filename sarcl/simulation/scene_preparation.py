@@ -92,7 +92,10 @@ def _prepared(plan: ScenePlan, *, tiled: bool, exact: bool) -> SceneEchoes:
         behind = FacetsBehindSheets.of(request, seen, cut.host, subdivision.plan, plan.error_budget)
         if behind is not None:
             skipped["shadowed"] -= behind.n_dark * len(seen.antennas)
-    bounced = BounceScene.of(seen.scene, request.bounces, plan.error_budget)
+    highest = seen.waveform.center + seen.waveform.bandwidth / 2
+    bounced = BounceScene.of(seen.scene, request.bounces, plan.error_budget, highest, request.host)
+    if bounced is not None:
+        bounced.refuse_many(seen.antennas.tx, seen.antennas.rx)
     if bounced is None and behind is None:
         _check_left(request, points, facets, skipped)
     if points is not None:

@@ -11,6 +11,7 @@ For this folder alone:
     _facet_tree      facets that lie in cones and cylinders
     _flat_facets     pairs of triangles joined to larger facets, and closed bodies
     _occlusion       what lies in the way of beams
+    _paths           beams of all orders, as many at a time as memory holds
     _polygons        convex polygons in space, clipped many at a time
     _sums            sums over triangles at all frequencies of the samples
     _weak_beams      bounds on the echoes of beams, and which are too weak to be followed

@@ -7,8 +7,10 @@ in the way of an earlier leg is mirrored too, so that all shadows on facet m fal
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 
@@ -17,7 +19,7 @@ from ...base.constants import EDGE_ON
 from ...base.vectors import dot, unit
 from ...scene.terrain import Heights, is_overlooked, stand_above
 from ._facet_tree import MOST_PAIRS, Cones, FacetTree
-from ._polygons import Polygons, apart, folded, joined
+from ._polygons import Polygons, TooManyAtOnce, apart, folded, joined
 
 ON_PLANE = 1e-6  # of the scene's diagonal: corners nearer to a plane lie in it, as for shadows (visibility/lit_parts)
 SNAP = 1e-11  # of the diagonal: rounding of clipped corners
@@ -29,6 +31,7 @@ TURNED_AWAY = (
 MOST_ANGLE = 1.55  # rad, of a cone: wider ones hold everything in front
 MOST_LEGS = 5_000  # that are compared with the ground below them before its facets are looked at
 ROWS_AT_ONCE = 200_000  # pairs of a beam and a facet that are looked at together
+Value = TypeVar("Value")
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,6 +168,11 @@ class Beams:
         chains, normals = self.chains[old_chain], self.normals[old_chain]
         return Beams(chain, self.pulse[rows], chains, normals, self.apex[rows], self.polygons[rows])
 
+    def of_chains(self, chains: slice) -> Beams:
+        """The beams of consecutive chains."""
+        ends = np.append(self.first_of, len(self))[[chains.start, chains.stop]]
+        return self if ends[1] - ends[0] == len(self) else self[np.arange(*ends)]
+
     @property
     def order(self) -> int:
         """Number of facets m."""
@@ -208,17 +216,41 @@ def mirrored(places: np.ndarray, normal: np.ndarray, point: np.ndarray) -> np.nd
     return np.asarray(places - 2 * ((places - point) * normal).sum(axis=-1, keepdims=True) * normal)
 
 
-def first_facets(surfaces: Surfaces, tx: np.ndarray, turn: float) -> np.ndarray:
-    """Facets from which waves of transmitters, m (n, 3), may reach others.
+def first_facets(surfaces: Surfaces, tx: np.ndarray, turn: float) -> tuple[np.ndarray, int]:
+    """Facets from which waves of transmitters, m (n, 3), may reach others, and in how many ways.
 
     turn  rad: directions from a facet to two of the transmitters, or receivers, differ by no more
     """
     facets, middle = np.flatnonzero(surfaces.mirrors), tx[len(tx) // 2]
     sine = dot(surfaces.normals[facets], unit(middle - surfaces.centers[facets]))
     facets = facets[(sine > -turn) | surfaces.two_sided[facets]]
-    image = mirrored(np.repeat(middle[None], len(facets), axis=0), surfaces.normals[facets], surfaces.centers[facets])
-    spheres = surfaces.polygons[facets].spheres
-    return np.asarray(facets[np.unique(_reached(surfaces, facets, *spheres, image, turn)[0])])
+
+    def reached_from(block: slice) -> tuple[np.ndarray, int]:
+        members = facets[block]
+        image = mirrored(
+            np.repeat(middle[None], len(members), axis=0), surfaces.normals[members], surfaces.centers[members]
+        )
+        which = _reached(surfaces, members, *surfaces.polygons[members].spheres, image, turn)[0]
+        return members[np.unique(which)], len(which)
+
+    parts = list(halved(len(facets), reached_from))
+    return np.concatenate([part for part, _ in parts]), sum(number for _, number in parts)
+
+
+def halved(number: int, function: Callable[[slice], Value]) -> Iterator[Value]:
+    """Values of a function for all of `number` places, for a half of these where there are too many pairs at once."""
+    blocks = [slice(0, number)]
+    while blocks:
+        block = blocks.pop()
+        try:
+            value = function(block)
+        except TooManyAtOnce:
+            middle = (block.start + block.stop) // 2
+            if middle == block.start:
+                raise
+            blocks += [slice(middle, block.stop), slice(block.start, middle)]
+        else:
+            yield value
 
 
 def first(surfaces: Surfaces, tx: np.ndarray, facets: np.ndarray) -> Beams:

@@ -8,12 +8,13 @@ from functools import cached_property
 import numpy as np
 
 from ...base.morton import morton_order
-from ._polygons import folded
+from ._polygons import TooManyAtOnce, folded
 
 BRANCHES = 8  # spheres that the sphere above them holds
 AT_ONCE = 20_000  # cones that are looked at together
 MOST_PAIRS = 20_000_000  # pairs of a beam and a facet that are looked at together
-PAIR_BYTES = 400.0  # that each of them takes meanwhile
+FEWEST = 2  # cones, of both sides of a facet, of which no number of pairs is too many
+PAIR_BYTES = 700.0  # that each of them takes meanwhile, as measured of random facets, with what is cut of it
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,19 +70,14 @@ class FacetTree:
         return levels
 
     def within(self, cones: Cones) -> tuple[np.ndarray, np.ndarray]:
-        """Pairs of a cone and a triangle that may lie in it (n,), (n,), in the order of the cones; MemoryError for too
-        many."""
+        """Pairs of a cone and a triangle that may lie in it (n,), (n,), in the order of the cones; TooManyAtOnce
+        for too many of more than two cones."""
         pairs, number = [], 0
         for first in range(0, len(cones.radius), AT_ONCE):
             pairs.append(self._pairs_within(cones, first))
             number += len(pairs[-1][0])
-            if number > self._most_pairs:
-                total = number / (first + AT_ONCE) * len(cones.radius)
-                raise MemoryError(
-                    f"facets of this scene may reflect to one another in about {total:.0e} ways, which need "
-                    f"{PAIR_BYTES * total / 1e9:.0f} GB; take fewer bounces, a coarser mesh, or rough materials "
-                    "(height inf) for what need not reflect to others"
-                )
+            if number > self._most_pairs and len(cones.radius) > FEWEST:
+                raise TooManyAtOnce
         if not pairs:
             return np.zeros(0, np.int64), np.zeros(0, np.int64)
         which, facet = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
@@ -95,6 +91,8 @@ class FacetTree:
             center, radius = self._levels[depth]
             is_near = cones.meet(which, center[node], radius[node])
             which, node = which[is_near], node[is_near]
+            if len(which) > self._most_pairs and len(cones.radius) > FEWEST:
+                raise TooManyAtOnce
             if depth:
                 below = len(self._levels[depth - 1][0])
                 which = np.repeat(which, BRANCHES)

@@ -15,19 +15,23 @@ from ...base.vectors import cross, distinct, dot, unit
 from ...scattering.physical_optics import normals_and_areas
 from ._polygons import Polygons, folded, joined
 
-FLAT = 1e-9  # of the diagonal: corners nearer to a plane or a line lie in it
-ROUNDING = 1e-9  # relative, of areas, and rad, of directions
+FLAT = 1e-9  # of the diagonal: corners nearer to a plane or a line lie in it, whatever the distance given
+ROUNDING, KEPT = 1e-9, 1e-4  # relative, of areas: as they are computed, and by which they may change
 LONGEST = 1 / 8  # of the diagonal: longer polygons are halved, since the shadows of many others cut them into parts
 FEW = 32  # polygons that are not halved
 MOST_CORNERS = 6  # of a polygon: all are stored with as many corners as the largest one
 
 
-def joined_facets(triangles: np.ndarray, groups: np.ndarray, diagonal: float) -> tuple[Polygons, np.ndarray]:
+def joined_facets(
+    triangles: np.ndarray, groups: np.ndarray, diagonal: float, distance: float = 0.0
+) -> tuple[Polygons, np.ndarray]:
     """Triangles, m (k, 3, 3), joined to convex polygons; and the first triangle of each (n,), rising.
 
-    groups  (k,) int: triangles of different groups are not joined
+    groups    (k,) int: triangles of different groups are not joined
+    distance  m, of a corner from the plane and the outline of what it is joined to, at most
     """
-    edge, back = _flat_edges(triangles, groups, FLAT * diagonal)
+    flat = max(FLAT * diagonal, distance)
+    edge, back = _flat_edges(triangles, groups, flat)
     size = len(triangles)
     links = coo_array((np.ones(len(edge), bool), (edge // 3, back // 3)), shape=(size, size))
     part = connected_components(links, directed=False)[1]
@@ -35,10 +39,10 @@ def joined_facets(triangles: np.ndarray, groups: np.ndarray, diagonal: float) ->
     is_joined = np.zeros(size, bool)
     order = np.argsort(part, kind="stable")
     for members in np.split(order, np.flatnonzero(np.diff(part[order])) + 1):
-        if len(members) > 2 and (outline := _outline(triangles[members])) is not None:
+        if len(members) > 2 and (outline := _outline(triangles[members], flat)) is not None:
             corners[int(members[0])], is_joined[members] = outline, True
     rest = ~is_joined[edge // 3]
-    corners |= _grown(triangles, is_joined, edge[rest], back[rest], FLAT * diagonal)
+    corners |= _grown(triangles, is_joined, edge[rest], back[rest], flat)
     first = np.array(sorted(corners), np.int64)
     count = np.array([len(corners[f]) for f in first.tolist()], np.int64)
     size = max(3, int(count.max(initial=3)))
@@ -66,21 +70,55 @@ def _flat_edges(triangles: np.ndarray, groups: np.ndarray, flat: float) -> tuple
     return edge[order], back[order]
 
 
-def _outline(triangles: np.ndarray) -> np.ndarray | None:
+def _outline(triangles: np.ndarray, flat: float) -> np.ndarray | None:
     """Corners of the convex polygon that triangles of one plane, m (k, 3, 3), fill, m (n, 3); None where they fill
-    none of few corners."""
-    normal, area = normals_and_areas(triangles)
-    x = unit(triangles[0, 1] - triangles[0, 0])
+    none of few corners, to the distance `flat`, m."""
+    area = normals_and_areas(triangles)[1]
     places = triangles.reshape(-1, 3)
-    flat = (places - places[0]) @ np.stack([x, cross(normal[0], x)], axis=1)
-    hull = ConvexHull(flat)
-    if abs(hull.volume - area.sum()) > ROUNDING * hull.volume:
+    x, y, normal = _frame(triangles)
+    height = (places - places[0]) @ normal
+    if np.ptp(height) > 2 * flat:
         return None
-    ring = flat[hull.vertices]  # counterclockwise
-    before, after = ring - np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0) - ring
-    turn = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
-    is_corner = turn > ROUNDING * np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
-    return np.asarray(places[hull.vertices[is_corner]]) if is_corner.sum() <= MOST_CORNERS else None
+    plane = (places - places[0]) @ np.stack([x, y], axis=1)
+    hull = ConvexHull(plane)
+    corners = hull.vertices  # counterclockwise
+    while len(corners) > 3:
+        away = _turns(plane[corners])
+        least = int(away.argmin())
+        if away[least] > flat:
+            break
+        corners = np.delete(corners, least)
+    if len(corners) > MOST_CORNERS or not _fills(plane[corners], float(area.sum()), flat):
+        return None
+    if np.ptp(height) <= ROUNDING * np.ptp(plane, axis=0).max():
+        return np.asarray(places[corners])
+    middle = (height.max() + height.min()) / 2
+    return np.asarray(places[corners] - (height[corners] - middle)[:, None] * normal)
+
+
+def _frame(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Two unit vectors across the mean normal of triangles, m (k, 3, 3), and this, right-handed."""
+    spokes = triangles[:, 1:] - triangles[:, :1]
+    normal = unit(cross(spokes[:, 0], spokes[:, 1]).sum(axis=0))
+    along = spokes[0, 0]
+    x = unit(along - (along @ normal) * normal)
+    return x, cross(normal, x), normal
+
+
+def _turns(ring: np.ndarray) -> np.ndarray:
+    """Distances, m (n,), of corners of a polygon, m (n, 2), from the line between their neighbours."""
+    before, after = np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0)
+    along, away = after - before, ring - before
+    size = np.maximum(np.hypot(*along.T), 1e-300)
+    return np.asarray(np.abs(along[:, 0] * away[:, 1] - along[:, 1] * away[:, 0]) / size)
+
+
+def _fills(ring: np.ndarray, area: float, flat: float) -> bool:
+    """Whether the polygon with corners m (n, 2) has an area, m^2, as far as its outline is known to `flat`, m."""
+    after = np.roll(ring, -1, axis=0)
+    own = float((ring[:, 0] * after[:, 1] - ring[:, 1] * after[:, 0]).sum()) / 2
+    length = float(np.hypot(*(after - ring).T).sum())
+    return abs(own - area) <= max(ROUNDING * area, min(flat * length, KEPT * area))
 
 
 def _grown(
@@ -90,10 +128,11 @@ def _grown(
     by their first triangle."""
     places, corner = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
     number = corner.reshape(-1, 3).tolist()
-    normal = normals_and_areas(triangles)[0]
+    normal, area = normals_and_areas(triangles)
     rings = {k: number[k] for k in np.flatnonzero(~is_joined).tolist()}  # with corners at which they do not turn
     turning = {k: set(ring) for k, ring in rings.items()}
     root = list(range(len(triangles)))
+    members = {k: [k] for k in rings}
 
     def root_of(k: int) -> int:
         while root[k] != k:
@@ -106,6 +145,13 @@ def _grown(
         a, b = places[at] - places[before], places[after] - places[at]
         size = float(np.sqrt(max(a @ a, b @ b)))
         return float(normal[k] @ np.cross(a, b)) / size
+
+    def fits(parts: list[int], ring: list[int]) -> bool:
+        """Whether all corners of triangles lie in one plane, and the polygon of a ring has their area."""
+        x, y, n = _frame(triangles[parts])
+        height = (triangles[parts].reshape(-1, 3) - places[ring[0]]) @ n
+        plane = (places[ring] - places[ring[0]]) @ np.stack([x, y], axis=1)
+        return bool(np.ptp(height) <= 2 * flat) and _fills(plane, float(area[parts].sum()), flat)
 
     pairs, is_growing = list(zip(edges.tolist(), backs.tolist(), strict=True)), True
     while is_growing:
@@ -131,7 +177,10 @@ def _grown(
             corners |= {at for at, by in zip((a[-1], b[-1]), turns, strict=True) if by > flat}
             if min(turns) < -flat or len(corners) > MOST_CORNERS:
                 continue
+            if not fits(members[own] + members[other], [at for at in a[:-1] + b[:-1] if at in corners]):
+                continue
             first, second = min(own, other), max(own, other)
+            members[first] += members.pop(second)
             root[second], rings[first], turning[first] = first, a[:-1] + b[:-1], corners
             del rings[second], turning[second]
             is_growing = True

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...base.vectors import cross, dot, unit
-from ._beams import LEAST_AREA, TURNED_AWAY, Beams, Surfaces, faces, first, in_blocks, mirrored
+from ._beams import LEAST_AREA, TURNED_AWAY, Beams, Surfaces, faces, first, halved, in_blocks, mirrored
 from ._facet_tree import Cones
 from ._polygons import PAIRS_AT_ONCE, Polygons, Shadows, folded, joined, less_shadows
 
@@ -35,10 +35,15 @@ def lit(surfaces: Surfaces, beams: Beams, turn: float) -> tuple[Polygons, np.nda
 def sides_seen(surfaces: Surfaces, antennas: np.ndarray, turn: float) -> np.ndarray:
     """Whether antennas, m (n, 3), may see facets on the side behind their normal and on that in front (k, 2)."""
     out = np.zeros((len(surfaces.areas), 2), bool)
-    beams = first(surfaces, antennas, np.flatnonzero(surfaces.mirrors))
-    beams = beams[np.unique(lit(surfaces, beams, turn)[1])]
-    facet = beams.chains[:, 0]
-    out[facet, surfaces.side(facet, beams.normals[:, 0])] = True
+    facets = np.flatnonzero(surfaces.mirrors)
+
+    def lit_of(block: slice) -> Beams:
+        beams = first(surfaces, antennas, facets[block])
+        return beams[np.unique(lit(surfaces, beams, turn)[1])]
+
+    for beams in halved(len(facets), lit_of):
+        facet = beams.chains[:, 0]
+        out[facet, surfaces.side(facet, beams.normals[:, 0])] = True
     for place in antennas:  # edge-on, where physical optics fades out
         sine = dot(surfaces.normals, unit(place - surfaces.centers))
         out[np.abs(sine) <= TURNED_AWAY] = True

@@ -13,6 +13,10 @@ PAIRS_AT_ONCE = 200_000  # of a piece and a shadow that are looked at together
 MOST_PIECES = 4_000_000  # polygons that shadows may leave: about 1 GB
 
 
+class TooManyAtOnce(MemoryError):
+    """Pairs of facets, or parts of polygons, that memory does not hold together: those of fewer beams are fewer."""
+
+
 @dataclass(frozen=True, eq=False)
 class Polygons:
     """Convex polygons: corners m (k, n, 3), of which the first `count` (k,) count; the others repeat the first."""
@@ -203,7 +207,7 @@ def less_shadows(
         owner, pair = _repeated(first[part_of] + 1, number[shaded][part_of] - 1)
         pieces, of, shadow = parts, of[shaded][part_of], shadow[pair]
         if len(of) > MOST_PIECES:
-            raise MemoryError(
+            raise TooManyAtOnce(
                 f"shadows cut what facets reflect to one another into more than {MOST_PIECES:,} parts at a time; take "
                 "fewer bounces or a coarser mesh"
             )

@@ -10,6 +10,8 @@ source     docs/theory/bounces.md
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
@@ -53,3 +55,31 @@ def strong(bound: np.ndarray, pulse: np.ndarray, budget: np.ndarray) -> np.ndarr
     start = np.searchsorted(pulse[order], np.arange(len(budget)))
     total -= np.append(0.0, total)[start][pulse[order]]
     return np.sort(order[total > budget[pulse[order]]])
+
+
+@dataclass(eq=False)
+class Budget:
+    """What weak beams may add up to, over all blocks of beams: power only grows from one block to the next, so that the
+    bounds of all that are left out stay below `share` of the root of all power.
+
+    share  relative, 0: none is left out
+    power  m^2 (n_pulses,), of the echoes so far, of blocks and orders at random phases
+    spent  m (n_pulses,): bounds of the beams left out so far
+    """
+
+    coatings: Coatings
+    frequencies: np.ndarray
+    n_polarizations: int
+    share: float
+    power: np.ndarray
+    spent: np.ndarray
+
+    def strong(self, beams: Beams) -> tuple[Beams, np.ndarray]:
+        """Beams less the weak ones, and the bounds of these, m (n_pulses,): not spent yet."""
+        none = np.zeros(len(self.spent))
+        if not self.share or not self.power.any():
+            return beams, none
+        bound = bounds(beams, self.coatings, self.frequencies, self.n_polarizations)
+        rows = strong(bound, beams.pulse, np.maximum(self.share * np.sqrt(self.power) - self.spent, 0))
+        weak = np.delete(np.arange(len(beams)), rows)
+        return beams[rows], np.bincount(beams.pulse[weak], bound[weak], len(none))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -18,16 +18,16 @@ from ...scene.scene import Scene
 from ...scene.terrain import facets_on
 from ...scene.triangles import bisect, edges, solid
 from ..spreading import ChannelView, Counts
-from . import _beams, _occlusion, _sums
+from . import _sums
 from ._amplitudes import Coatings, Facets
-from ._beams import Beams, Ground, Surfaces
-from ._facet_tree import MOST_PAIRS
+from ._beams import Beams, Ground, Surfaces, in_blocks
+from ._facet_tree import MOST_PAIRS, PAIR_BYTES
 from ._flat_facets import closed, joined_facets, tiles
+from ._paths import BeamLimits, LitBeams, Paths, blocks
 from ._polygons import Polygons, joined
-from ._weak_beams import bounds, strong
+from ._weak_beams import Budget
 
 PULSES_AT_ONCE, BEAMS_AT_ONCE = 128, 60_000  # pulses of a block, and pairs of these and facets that reflect to others
-MOST_TURN = 0.05  # rad, by which directions to antennas differ within a block
 WEAK = 0.1  # of the tolerance: sum of the bounds of beams that are left out
 CURVATURE = 0.9  # rad over the tolerance: rms phase of the wave's curvature over a triangle; the rest is for weak beams
 # Rms of what curvature, less its mean, adds over a triangle, over what it adds at the corner that is farthest from the
@@ -36,20 +36,9 @@ ROOT_MEAN_SQUARE = 0.2
 DIRECTION = 0.5  # rad over the root of the tolerance: by which directions change over a triangle
 PROFILES = 1 / 300  # of the tolerance: error of sums over frequencies
 MOST_SHADING = 20_000  # facets that only cast shadows, from which on joining them would take longer than it saves
+FLATNESS = 0.25  # rad over the tolerance: phases of corners of a flat part, by their distances from its plane
 NARROW = 0.5  # share of the area in facets narrower than a wavelength from which on there is a warning
 NODES = 6  # frequencies at which matrices of dispersive materials are computed
-
-
-@dataclass(frozen=True)
-class BeamLimits:
-    """How beams are looked for.
-
-    many        facets that a beam may reach, on average, from which on shadows on single facets are looked at first
-    most_pairs  of a beam and a facet that are looked at together
-    """
-
-    many: float = 30.0
-    most_pairs: int = MOST_PAIRS
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +46,7 @@ class BounceScene:
     """Facets of a scene that reflect to one another, about `origin`, m (3,).
 
     bounces    of the last order that is followed;  tolerance  relative to the bounced echoes at random phases
+    flat       m: parts of a mesh are joined where their corners are no farther from one plane
     """
 
     surfaces: Surfaces
@@ -64,11 +54,17 @@ class BounceScene:
     origin: np.ndarray
     bounces: int
     tolerance: float
-    limits: BeamLimits = BeamLimits()
+    flat: float
+    limits: BeamLimits = field(default_factory=BeamLimits)
 
     @classmethod
-    def of(cls, scene: Scene, bounces: int, tolerance: float) -> BounceScene | None:
-        """The facets of a scene, None where no two of them reflect."""
+    def of(
+        cls, scene: Scene, bounces: int, tolerance: float, frequency: float, max_bytes: float = np.inf
+    ) -> BounceScene | None:
+        """The facets of a scene, None where no two of them reflect.
+
+        frequency  the highest, Hz;  max_bytes  for beams at a time
+        """
         if bounces == 1:
             return None
         fine = np.array([m.height for m in scene.materials])[scene.material]
@@ -82,29 +78,49 @@ class BounceScene:
             if on is not None and not mirrors[on].any():
                 ground = Ground(scene.triangles[on & is_solid] - origin, scene.heights, origin)
                 is_solid &= ~on
-        some = np.flatnonzero(is_solid)
-        triangles, mirrors = scene.triangles[some], mirrors[some]
-        height = np.hypot(np.where(mirrors, fine[some], 0.0), scene.roughness[some])
-        coatings = Coatings(scene.material[some], scene.materials, scene.reflectivity[some], height)
+        solids = np.flatnonzero(is_solid)
+        triangles, mirrors = scene.triangles[solids], mirrors[solids]
+        height = np.hypot(np.where(mirrors, fine[solids], 0.0), scene.roughness[solids])
+        coatings = Coatings(scene.material[solids], scene.materials, scene.reflectivity[solids], height)
         polygons, is_closed = Polygons.of(triangles - origin), closed(triangles)
-        surfaces = Surfaces(polygons, scene.two_sided[some], mirrors, is_closed, ground=ground)
-        return cls(surfaces, coatings, origin, bounces, tolerance)
+        surfaces = Surfaces(polygons, scene.two_sided[solids], mirrors, is_closed, ground=ground)
+        flat = FLATNESS * tolerance * SPEED_OF_LIGHT / frequency / (4 * np.pi)
+        limits = BeamLimits(most_pairs=int(min(MOST_PAIRS, max_bytes / PAIR_BYTES)))
+        return cls(surfaces, coatings, origin, bounces, tolerance, flat, limits)
+
+    def refuse_many(self, tx: np.ndarray, rx: np.ndarray) -> None:
+        """MemoryError where facets may reflect to one another in too many ways, as seen from antennas, m (n, 3), at the
+        pulses that are looked at first, in the middle and last."""
+        tx, rx = tx - self.origin, rx - self.origin
+        surfaces = self.joined[0].seen_from(np.concatenate([tx, rx]))
+        rows = list(blocks(surfaces, tx, rx, PULSES_AT_ONCE))
+        for i in sorted({0, len(rows) // 2, len(rows) - 1}):
+            paths = Paths(surfaces, tx[rows[i]], rx[rows[i]], self.bounces, self.limits)
+            number = paths.first_facets[1]
+            if number > self.limits.most_ways:
+                raise MemoryError(
+                    f"facets of this scene may reflect to one another in about {number:.0e} ways, more than the "
+                    f"{self.limits.most_ways:.0e} that are followed; take fewer bounces, a coarser mesh, or rough "
+                    "materials (height inf) for what need not reflect to others"
+                )
 
     @cached_property
     def joined(self) -> tuple[Surfaces, Coatings]:
         """These facets, triangles of one plane and material joined where together they are convex."""
         surfaces, coatings = self.surfaces, self.coatings
         joins = surfaces.mirrors | ((~surfaces.mirrors).sum() <= MOST_SHADING)
-        some, single = np.flatnonzero(joins), np.flatnonzero(~joins)
+        joinable, single = np.flatnonzero(joins), np.flatnonzero(~joins)
         alike = coatings.material, coatings.reflectivity, coatings.height, surfaces.two_sided, surfaces.mirrors
-        groups = np.unique(np.stack([values[some] for values in alike], axis=1), axis=0, return_inverse=True)[1].ravel()
-        polygons, first = joined_facets(surfaces.corners[some], groups, surfaces.diagonal)
+        groups = np.unique(np.stack([values[joinable] for values in alike], axis=1), axis=0, return_inverse=True)[
+            1
+        ].ravel()
+        polygons, first = joined_facets(surfaces.corners[joinable], groups, surfaces.diagonal, self.flat)
         polygons = joined([polygons, surfaces.polygons[single]]) if len(single) else polygons
-        polygons, some = tiles(polygons, np.append(some[first], single), surfaces.diagonal)
+        polygons, first = tiles(polygons, np.append(joinable[first], single), surfaces.diagonal)
         coatings = Coatings(
-            coatings.material[some], coatings.materials, coatings.reflectivity[some], coatings.height[some]
+            coatings.material[first], coatings.materials, coatings.reflectivity[first], coatings.height[first]
         )
-        flags = surfaces.two_sided[some], surfaces.mirrors[some], surfaces.closed[some]
+        flags = surfaces.two_sided[first], surfaces.mirrors[first], surfaces.closed[first]
         return Surfaces(polygons, *flags, self.limits.most_pairs, surfaces.ground), coatings
 
     def narrow_share(self, wavelength: float) -> float:
@@ -168,110 +184,69 @@ class BounceSpreader:
             yield rows, self.values(pulses[rows], frequencies, exact=True)[0]
 
     def _blocks(self, pulses: np.ndarray) -> Iterator[slice]:
-        """Slices of pulses that are looked at together: antennas turn little within each."""
-        tx, rx = (end[pulses] - self.scene.origin for end in (self.view.antennas.tx, self.view.antennas.rx))
-        first = 0
-        while first < len(pulses):
-            number = min(PULSES_AT_ONCE, len(pulses) - first)
-            while number > 1 and max(self._turn(end[first : first + number]) for end in (tx, rx)) > MOST_TURN:
-                number = -(-number // 2)
-            yield slice(first, first + number)
-            first += number
+        """Slices of pulses that are looked at together."""
+        antennas = self.view.antennas
+        tx, rx = (end[pulses] - self.scene.origin for end in (antennas.tx, antennas.rx))
+        return blocks(self._surfaces, tx, rx, PULSES_AT_ONCE)
 
     def values(self, pulses: np.ndarray, frequencies: np.ndarray, *, exact: bool = False) -> tuple[np.ndarray, Counts]:
         """Echoes of pulses (n,) at frequencies, Hz, complex128 (n, n_polarizations, n_f); exact: added one by one."""
-        out = np.zeros((len(pulses), len(self.view.polarizations), len(frequencies)), np.complex128)
-        counts, origin, surfaces = Counts(), self.scene.origin, self._surfaces
-        tx, rx = (end[pulses] - origin for end in (self.view.antennas.tx, self.view.antennas.rx))
-        turn = max(self._turn(tx), self._turn(rx))
-        facets = _beams.first_facets(surfaces, tx, turn)
-        half = len(pulses) // 2
-        if len(facets) * len(pulses) > BEAMS_AT_ONCE and half:
+        view, scene = self.view, self.scene
+        out = np.zeros((len(pulses), len(view.polarizations), len(frequencies)), np.complex128)
+        counts, tx, rx = Counts(), *(end[pulses] - scene.origin for end in (view.antennas.tx, view.antennas.rx))
+        paths, half = Paths(self._surfaces, tx, rx, scene.bounces, scene.limits), len(pulses) // 2
+        if len(paths.first_facets[0]) * len(pulses) > BEAMS_AT_ONCE and half:
             (a, counts), (b, more) = (self.values(p, frequencies, exact=exact) for p in (pulses[:half], pulses[half:]))
             return np.concatenate([a, b]), counts + more
-        power = np.zeros(len(pulses))
-
-        def followed(beams: Beams) -> tuple[Beams, Counts]:
-            return self._followed(beams, frequencies, np.zeros(len(pulses)) if exact else power)
-
-        for beams, pieces, of, part in self._lit_beams(facets, tx, rx, turn, followed):
-            outside, late, latest, seen = 0, 0.0, -np.inf, np.bincount(of, minlength=len(beams)) > 0
-            if len(of):
-                triangles = self._facets(beams, pieces, of, rx)
+        share = 0.0 if exact or view.weights.is_needed else WEAK * scene.tolerance
+        zeros = np.zeros((2, len(pulses)))
+        budget = Budget(self._coatings, frequencies, len(view.polarizations), share, *zeros)
+        for lit in paths.followed(budget):
+            echo, outside, late, latest = np.zeros_like(out), 0, 0.0, -np.inf
+            for rows in self._pieces_at_once(lit, rx):
+                triangles = self._facets(lit.beams, lit.pieces[np.arange(rows.start, rows.stop)], lit.of[rows], rx)
                 inside = self._inside(triangles, pulses)
-                outside = int(seen.sum()) - len(np.unique(triangles.of[inside]))
-                echo = np.zeros_like(out)
+                hidden = np.setdiff1d(triangles.of, triangles.of[inside])
                 self._add(echo, pulses, frequencies, triangles.chosen(inside), exact)
-                power += (np.abs(echo) ** 2).sum(axis=1).mean(axis=1)
-                out += echo
-                if outside:
-                    late, latest = self._late(triangles, np.setdiff1d(triangles.of, triangles.of[inside]), pulses)
-            done = int(seen.sum()) - outside
-            unseen = part.pairs - part.weak - outside - done
-            orders = (0,) * (beams.order - 1) + (done,)
-            counts += part + Counts(0, outside, unseen=unseen, orders=orders, late=late, latest=latest)
+                if len(hidden):
+                    power, last = self._late(triangles, hidden, pulses)
+                    outside, late, latest = outside + len(hidden), late + power, max(latest, last)
+            budget.power += (np.abs(echo) ** 2).sum(axis=1).mean(axis=1)
+            out += echo
+            done = len(np.unique(lit.of)) - outside
+            orders = (0,) * (lit.beams.order - 1) + (done,)
+            unseen = lit.n_pairs - lit.n_weak - outside - done
+            counts += Counts(lit.n_pairs, outside, 0, 0, unseen, lit.n_weak, orders, late, latest=latest)
         return out, counts
 
-    def _lit_beams(
-        self,
-        facets: np.ndarray,
-        tx: np.ndarray,
-        rx: np.ndarray,
-        turn: float,
-        followed: Callable[[Beams], tuple[Beams, Counts]],
-    ) -> Iterator[tuple[Beams, Polygons, np.ndarray, Counts]]:
-        """Beams of each order from 2 on, their pulses counted from 0, what receivers, m (n, 3), see of them, the beam
-        of each piece, and the pairs of beam and facet that were looked at, and left out before their shadows.
+    def _pieces_at_once(self, lit: LitBeams, rx: np.ndarray) -> list[slice]:
+        """Slices of the pieces of beams, each with all pieces of a beam, whose triangles memory holds."""
+        beams, rows = lit.beams, lit.of
+        bend = sum(1 / np.linalg.norm(end[rows] - lit.pieces.center, axis=1) for end in (beams.apex, rx[beams.pulse]))
+        number = 1 + lit.pieces.area / self._longest(np.asarray(bend)) ** 2
+        first = np.searchsorted(rows, np.unique(rows))
+        parts = in_blocks(np.add.reduceat(number, first), self.scene.limits.most_pairs) if len(rows) else []
+        ends = np.append(first, len(rows))
+        return [slice(ends[part.start], ends[part.stop]) for part in parts]
 
-        facets  the first ones of beams;  followed  the beams that are, before their shadows are cut
-        """
-        surfaces = self._surfaces
-        beams, lit = _beams.first(surfaces, tx, facets), None
-        for number in range(2, self.scene.bounces + 1):
-            if not len(beams):
-                return
-            pairs, sides = _beams.reached(surfaces, beams, turn), None
-            is_last = number == self.scene.bounces
-            if len(pairs[0]) > self.scene.limits.many * len(beams.chains):  # what is in shadow is worth knowing before
-                if number == 2:
-                    lit = _occlusion.sides_seen(surfaces, tx, turn)
-                    facet, normal = beams.chains[:, 0], beams.normals[:, 0]
-                    beams = beams[np.flatnonzero(lit[facet, surfaces.side(facet, normal)][beams.chain])]
-                    pairs = _beams.reached(surfaces, beams, turn)
-                if is_last:
-                    is_same = lit is not None and np.array_equal(tx, rx)
-                    sides = lit if is_same else _occlusion.sides_seen(surfaces, rx, turn)
-            beams, n_pairs = _beams.extended(surfaces, beams, *pairs, rx if is_last else None, sides)
-            beams, part = followed(beams)
-            pieces, of = _occlusion.lit(surfaces, beams, turn)
-            arrives = np.bincount(of, minlength=len(beams)) > 0
-            beams, of = beams[np.flatnonzero(arrives)], (np.cumsum(arrives) - 1)[of]
-            yield beams, *_occlusion.seen(surfaces, beams, pieces, of, rx[beams.pulse], turn), part + Counts(n_pairs)
-
-    def _turn(self, antennas: np.ndarray) -> float:
-        """Angle, rad, by which directions from any facet to antennas, m (n, 3), differ from those to the middle one."""
-        low, high = box(self._surfaces.corners.reshape(-1, 3))
-        middle = antennas[len(antennas) // 2]
-        step = float(np.linalg.norm(antennas - middle, axis=1).max())
-        if not step:
-            return 0.0
-        distance = float(np.linalg.norm(antennas - np.clip(antennas, low, high), axis=1).min())
-        return float(2 * np.arcsin(min(1.0, step / (2 * distance)))) if distance else float(np.pi)
+    def _longest(self, bend: np.ndarray) -> np.ndarray:
+        """Longest distance of a triangle's corner from its centroid, m (n,); bend  sum of curvatures, 1/m."""
+        wave = 2 * np.pi * float(self.view.frequencies[-1]) / SPEED_OF_LIGHT
+        curved = np.sqrt(CURVATURE * self.scene.tolerance / (ROOT_MEAN_SQUARE * wave / 2 * bend))
+        return np.asarray(np.minimum(curved, DIRECTION * np.sqrt(self.scene.tolerance) / bend))
 
     def _facets(self, beams: Beams, pieces: Polygons, of: np.ndarray, rx: np.ndarray) -> Facets:
         """Triangles that are together the pieces of beams, small enough for plane waves."""
         corners = pieces.corners
         fans = [(i, np.flatnonzero(pieces.count > i + 1)) for i in range(1, corners.shape[1] - 1)]
-        triangles = np.concatenate([corners[some][:, [0, i, i + 1]] for i, some in fans])
-        of = np.concatenate([of[some] for _, some in fans])
-        wave = 2 * np.pi * float(self.view.frequencies[-1]) / SPEED_OF_LIGHT
+        triangles = np.concatenate([corners[rows][:, [0, i, i + 1]] for i, rows in fans])
+        of = np.concatenate([of[rows] for _, rows in fans])
         parts, numbers = [], []
         while len(triangles):
             center = triangles.mean(axis=1)
             radius = np.linalg.norm(triangles - center[:, None], axis=-1).max(axis=1)
             bend = sum(1 / np.linalg.norm(end[of] - center, axis=1) for end in (beams.apex, rx[beams.pulse]))
-            long = ROOT_MEAN_SQUARE * wave / 2 * radius**2 * bend > CURVATURE * self.scene.tolerance
-            long |= radius * bend > DIRECTION * np.sqrt(self.scene.tolerance)
+            long = radius > self._longest(np.asarray(bend))
             parts.append(triangles[~long])
             numbers.append(of[~long])
             triangles, of = (
@@ -280,14 +255,6 @@ class BounceSpreader:
             )
         of = np.concatenate(numbers)
         return Facets(np.concatenate(parts), beams[of], rx[beams.pulse[of]], of)
-
-    def _followed(self, beams: Beams, frequencies: np.ndarray, power: np.ndarray) -> tuple[Beams, Counts]:
-        """Beams less weak ones of the last order, and how many these are. power  m^2 (n,), of the orders before."""
-        number = len(beams)
-        if beams.order == self.scene.bounces and power.any() and not self.view.weights.is_needed:
-            bound = bounds(beams, self._coatings, frequencies, len(self.view.polarizations))
-            beams = beams[strong(bound, beams.pulse, WEAK * self.scene.tolerance * np.sqrt(power))]
-        return beams, Counts(0, weak=number - len(beams))
 
     def _inside(self, facets: Facets, pulses: np.ndarray) -> np.ndarray:
         """Numbers of the triangles inside the range window."""
@@ -299,13 +266,13 @@ class BounceSpreader:
 
     def _late(self, triangles: Facets, beams: np.ndarray, pulses: np.ndarray) -> tuple[float, float]:
         """Power of beams of these numbers (n,) in a sample, and the latest half path about the reference, m."""
-        some = triangles.chosen(np.flatnonzero(np.isin(triangles.of, beams)))
-        delta = some.path / 2 - self.view.antennas.reference_range[pulses[some.beams.pulse]]
+        late = triangles.chosen(np.flatnonzero(np.isin(triangles.of, beams)))
+        delta = late.path / 2 - self.view.antennas.reference_range[pulses[late.beams.pulse]]
         frequency = float(np.median(self.view.frequencies))
-        sent = some.shapes(np.array([frequency]), self._coatings) * self._weighted(some, pulses, frequency)
+        sent = late.shapes(np.array([frequency]), self._coatings) * self._weighted(late, pulses, frequency)
         sent *= np.exp(-4j * np.pi * frequency / SPEED_OF_LIGHT * delta)[:, None]
-        sums = np.zeros((int(some.of.max()) + 1, sent.shape[1]), np.complex128)
-        np.add.at(sums, some.of, sent)
+        sums = np.zeros((int(late.of.max()) + 1, sent.shape[1]), np.complex128)
+        np.add.at(sums, late.of, sent)
         return float((np.abs(sums) ** 2).sum()), float(delta.max())
 
     def _add(self, out: np.ndarray, pulses: np.ndarray, frequencies: np.ndarray, facets: Facets, exact: bool) -> None:
@@ -317,10 +284,10 @@ class BounceSpreader:
         at = chebyshev(band.mean(), float(np.ptp(band)), NODES) if varies and np.ptp(band) else band[:1]
         matrices = np.stack([self._weighted(facets, pulses, float(f)) for f in at], axis=1)
 
-        def amplitudes(some: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+        def amplitudes(rows: np.ndarray, wanted: np.ndarray) -> np.ndarray:
             basis = lagrange(at, wanted)
-            shapes = facets.chosen(some).shapes(wanted, coatings)
-            return np.asarray(shapes[:, :, None] * np.einsum("nmj,mf->nfj", matrices[some], basis))
+            shapes = facets.chosen(rows).shapes(wanted, coatings)
+            return np.asarray(shapes[:, :, None] * np.einsum("nmj,mf->nfj", matrices[rows], basis))
 
         error = PROFILES * scene.tolerance
         extra = 1 + (NODES - 1) * varies + 4 * bool(coatings.height.any())
@@ -337,7 +304,7 @@ class BounceSpreader:
             return out
         leaving = facets.rays()[0] * np.linalg.norm(facets.center - beams.apex, axis=1)[:, None]
         for row in np.unique(beams.pulse).tolist():
-            some = np.flatnonzero(beams.pulse == row)
-            ways = leaving[some], (facets.center - facets.rx)[some]
-            out[some] *= view.weights.of_paths(*ways, int(pulses[row]), frequency)[:, None]
+            rows = np.flatnonzero(beams.pulse == row)
+            ways = leaving[rows], (facets.center - facets.rx)[rows]
+            out[rows] *= view.weights.of_paths(*ways, int(pulses[row]), frequency)[:, None]
         return out

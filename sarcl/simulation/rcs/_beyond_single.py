@@ -82,8 +82,9 @@ def add_beyond_single_reflections(task: RcsTask, out: np.ndarray) -> None:
         edges = EdgeEchoes(PreparedEdges.pieces_of(scene, options.crease, np.inf, task.shading_device, share), view)
         for rows, values, _ in edges.exactly(np.arange(len(tx)), task.frequencies):
             out[rows] += values.transpose(0, 2, 1)
-    bounced = BounceScene.of(scene, options.bounces, share)
+    bounced = BounceScene.of(scene, options.bounces, share, float(frequencies[-1]))
     if bounced is not None:
+        bounced.refuse_many(tx, rx)
         for rows, values in BounceSpreader(bounced, view).exactly(np.arange(len(tx)), task.frequencies):
             out[rows] += values.transpose(0, 2, 1)
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from helpers.cases import planned_within
 
 import sarcl
 from sarcl.base.errors import NothingSeen
@@ -132,6 +133,32 @@ def test_flat_parts_with_a_hole_or_t_junctions_are_joined_to_few_facets():
     )
 
 
+def test_flat_parts_rounded_to_float32_are_joined_wherever_they_stand():
+    c, s = np.cos(0.4), np.sin(0.4)
+    turn = np.array([(c, -s, 0), (s, c, 0), (0, 0, 1)]) @ np.array([(1, 0, 0), (0, c, -s), (0, s, c)])
+    exact = dihedral_cut(6).triangles @ turn.T
+    place, options = np.array([1e3, 0, 0]), {"range_window": (-5, 5), "tolerance": 1e-2, "check": False, "bounces": 2}
+    track = sarcl.Trajectory(None, LOOK.positions @ turn.T + place)
+    flat, rounded = (
+        sarcl.echo(sarcl.Scene.facets(one + place), CHIRP, track, reference=place, **options)
+        for one in (exact, exact.astype(np.float32).astype(float))
+    )
+    assert number_of_two(rounded) == number_of_two(flat) == 2
+    assert np.linalg.norm(rounded.samples - flat.samples) <= 1e-3 * np.linalg.norm(flat.samples)
+
+
+def test_a_gently_bent_mesh_is_joined_no_farther_than_the_tolerance_allows():
+    bent = dihedral_cut(12).triangles.copy()
+    bent[: 144 * 2, :, 2] += (
+        2e-4 * bent[: 144 * 2, :, 0] ** 2
+    )  # neighbours differ by 3e-6 m, all by 5e-5 m from a plane
+    scene = sarcl.Scene.facets(bent)
+    options = {"reference": (0.5, 0.5, 0.5), "range_window": (-5, 5), "check": False, "bounces": 2}
+    loose, fine = (sarcl.echo(scene, CHIRP, LOOK, tolerance=t, **options) for t in (1e-1, 1e-3))
+    assert number_of_two(loose) < number_of_two(fine)
+    assert np.linalg.norm(loose.samples - fine.samples) <= 1e-1 * np.linalg.norm(fine.samples)
+
+
 def test_a_mesh_of_facets_narrower_than_a_wavelength_is_said():
     bent = dihedral_cut(40).triangles + 0.0
     bent[..., 2] += 0.05 * bent[..., 0] ** 2
@@ -161,8 +188,9 @@ def test_what_is_at_the_edge_of_a_beam_shades_it_at_all_pulses_of_a_block():
 
 def limit(monkeypatch, **limits):
     """Let beams be looked for within other limits."""
-    prepare = BounceScene.of
-    monkeypatch.setattr(BounceScene, "of", lambda *given: replace(prepare(*given), limits=BeamLimits(**limits)))
+    prepare = vars(BounceScene)["of"].__func__
+    function = classmethod(lambda *values: replace(prepare(*values), limits=BeamLimits(**limits)))
+    monkeypatch.setattr(BounceScene, "of", function)
 
 
 @pytest.mark.parametrize("bounces", [2, 3])
@@ -186,9 +214,47 @@ def test_shadows_on_single_facets_looked_at_first_change_nothing(bounces, monkey
         assert np.linalg.norm(first - second) <= 1e-6 * np.linalg.norm(second)
 
 
-def test_too_many_pairs_of_facets_are_refused_with_a_remedy(monkeypatch):
-    limit(monkeypatch, most_pairs=2)
-    with pytest.raises(
-        MemoryError, match=r"may reflect to one another in about .* ways.*fewer bounces, a coarser mesh"
-    ):
-        echo(sarcl.Scene.facets(halves(PLATES)))
+@pytest.mark.parametrize("prepared_seconds", [0.0, np.inf])
+def test_too_many_pairs_of_facets_are_refused_by_a_plan_and_a_run_alike(monkeypatch, prepared_seconds):
+    limit(monkeypatch, most_ways=1)
+    limits = {"prepared_seconds": prepared_seconds, "prepared_share": 0.0}
+    options = {"reference": (0.5, 0.5, 0.5), "range_window": (-5, 5), "tolerance": 1e-2, "bounces": 2}
+    scene, texts = sarcl.Scene.facets(halves(PLATES)), []
+    plan = planned_within(limits, sarcl.echo, scene, CHIRP, LOOK, **options)
+    for call in (plan.forecast, lambda: echo(scene)):
+        with pytest.raises(MemoryError, match=r"about 2e\+00 ways, more than the 1e.*fewer bounces, a coarser") as said:
+            call()
+        texts.append(str(said.value))
+    assert texts[0] == texts[1]
+
+
+@pytest.mark.parametrize("most_pairs", [1, 40])
+def test_beams_in_many_blocks_have_the_echoes_of_one_block_and_few_weak_ones(monkeypatch, most_pairs):
+    """Concrete blocks, whose beams of the last order are left out as far as a share of the tolerance goes."""
+    rng = np.random.default_rng(3)
+    places = rng.uniform((0, 0, 0.05), (1.5, 1.5, 0.6), (4, 3))
+    triangles = np.concatenate([halves(PLATES), *(block(tuple(p), tuple(p + 0.3)) for p in places)])
+    scene = sarcl.Scene.facets(triangles, material="concrete")
+    options = {"bounces": 3, "reference": (0.5, 0.5, 0.5), "range_window": (-9, 9), "check": False}
+    exact = sarcl.echo(scene, CHIRP, LOOK, tolerance=1e-4, **options).samples
+    skipped, pairs = [], []
+    for most in (most_pairs, 10**7):
+        limit(monkeypatch, most_pairs=most)
+        raw = sarcl.echo(scene, CHIRP, LOOK, tolerance=3e-1, **options)
+        skipped.append(raw.report.contributions_skipped["weak reflections"])
+        pairs.append(raw.report.contributions_done + sum(raw.report.contributions_skipped.values()))
+        assert np.linalg.norm(raw.samples - exact) <= raw.report.predicted_error * np.linalg.norm(exact)
+    assert 0 < skipped[0] <= 1.2 * skipped[1] and abs(pairs[0] - pairs[1]) <= 0.05 * pairs[1]
+
+
+@pytest.mark.filterwarnings("ignore:mesh too fine")
+def test_blocks_of_beams_share_one_sum_of_what_is_left_out(monkeypatch):
+    """120 random facets: about 10 beams fit into the sum of bounds, twice as many where each block has its own."""
+    rng = np.random.default_rng(0)
+    triangles = rng.uniform(-1.5, 1.5, (120, 1, 3)) + rng.uniform(-0.5, 0.5, (120, 3, 3))
+    scene = sarcl.Scene.facets(triangles, two_sided=True, material="concrete")
+    wave = sarcl.Waveform.chirp(center=1.1e9, bandwidth=50e6, duration=1e-6)
+    options = {"reference": (0, 0, 0), "range_window": (-20, 20), "tolerance": 3e-1, "check": False}
+    limit(monkeypatch, most_pairs=30)
+    raw = sarcl.echo(scene, wave, LOOK, bounces=2, **options)
+    assert 0 < raw.report.contributions_skipped["weak reflections"] < 18
