@@ -58,13 +58,16 @@ def test_rcs_is_the_echo_from_far_away(options, receiver):
     assert np.linalg.norm(got - single) > 20 * np.linalg.norm(got - wanted)
 
 
-def test_edges_of_a_box_in_closed_form_at_several_frequencies():
-    """Sums over the edges that face the antenna, each a constant times sinc; the box turned so that none is grazed."""
+def test_edges_of_a_tetrahedron_in_closed_form_at_several_frequencies():
+    """Sums over the edges that face the antenna, each a constant times sinc; turned so that none is grazed. Borders of
+    triangles meet: no wave from one to another is added."""
+    corners = np.array([[0.4, 0.1, 0.0], [-0.2, 0.3, 0.05], [-0.1, -0.35, 0.0], [0.05, 0.0, 0.5]])
+    solid = Scene.facets(corners[[[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]], two_sided=False)
     frequencies, azimuth, elevation = np.array([9e9, 3e9, 10e9]), 0.35, 0.5
     options = {"polarization": ("HH", "HV", "VV"), "tolerance": 1e-4, "shadows": False}
-    both, facets = (sarcl.rcs(BOX, azimuth, elevation, frequencies, edges=edges, **options) for edges in (True, False))
+    both, facets = (sarcl.rcs(solid, azimuth, elevation, frequencies, edges=e, **options) for e in (True, False))
     look = np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
-    edges = wedges(BOX.triangles, BOX.two_sided, 0.35)
+    edges = wedges(solid.triangles, solid.two_sided, 0.35)
     looks = np.tile(look, (len(edges), 1))
     matrix = edge_matrix(WedgeShape(edges.inward, edges.normal, edges.number), looks, looks)
     way, k = edges.ends[:, 1] - edges.ends[:, 0], 2 * np.pi * frequencies[:, None] / 299792458.0
