@@ -32,6 +32,7 @@ from ..base.constants import SPEED_OF_LIGHT
 from ..base.errors import warn
 from ..base.rows import spread_over
 from ..base.types import LazyRows
+from ._row_fields import LEAST_STEP
 from ._time_record import ROUNDING, Signal, Sweep, TimeRecord, signal_of
 from .waveform import Waveform
 
@@ -58,6 +59,11 @@ def spectra_of(record: TimeRecord) -> Spectra:
     if signal.kind == "chirped":
         return _chirped(signal, record.waveform, record.pulse_time)
     return _compressed(signal, record.waveform)
+
+
+def _check_step(step: float, values: str) -> None:
+    if step < LEAST_STEP:
+        raise ValueError(f"{values}: {step:g} Hz from frequency to frequency, wanted {LEAST_STEP:g} Hz; is it in MHz?")
 
 
 def _check_rate(rate: float, bandwidth: float, name: str) -> None:
@@ -106,6 +112,7 @@ def _of_pulses(signal: Signal, delay: np.ndarray, bandwidth: float, factor: comp
     n, rate, carrier = signal.n, signal.rate, signal.carrier
     length = n + n_zeros
     step = rate / length
+    _check_step(step, f"rate is {rate:g} Hz")
     n_bins = int(np.clip(round(bandwidth / step), 1, length))
     lowest = -(n_bins - 1) / 2  # in steps, of the first frequency, from the carrier
     reference = SPEED_OF_LIGHT / 2 * (delay + (n - 1) / (2 * rate))
@@ -161,6 +168,7 @@ def _dechirped(signal: Signal, sweep: Sweep) -> Spectra:
     spectrum = _by_rows(signal.samples, n, spectra)
     if sweep.beat is not None and not sweep.reference.any():
         _check_beat(spectrum, sweep.beat, float(np.median(delay)) * abs(sweep.rate) / rate)
+    _check_step(abs(sweep.rate) / rate, f"sweep_rate is {sweep.rate:g} Hz/s and rate {rate:g} Hz")
     return Spectra(spectrum, frequency, abs(sweep.rate) / rate, reference)
 
 

@@ -232,7 +232,9 @@ class BounceSpreader:
     def _longest(self, bend: np.ndarray) -> np.ndarray:
         """Longest distance of a triangle's corner from its centroid, m (n,); bend  sum of curvatures, 1/m."""
         wave = 2 * np.pi * float(self.view.frequencies[-1]) / SPEED_OF_LIGHT
-        curved = np.sqrt(CURVATURE * self.scene.tolerance / (ROOT_MEAN_SQUARE * wave / 2 * bend))
+        # a triangle has the gain of its centroid: smaller ones where gains change over a beam
+        share = 1.0 if self.view.weights.is_needed else ROOT_MEAN_SQUARE
+        curved = np.sqrt(CURVATURE * self.scene.tolerance / (share * wave / 2 * bend))
         return np.asarray(np.minimum(curved, DIRECTION * np.sqrt(self.scene.tolerance) / bend))
 
     def _facets(self, beams: Beams, pieces: Polygons, of: np.ndarray, rx: np.ndarray) -> Facets:

@@ -87,7 +87,7 @@ def test_kernels_are_their_twins(task):
     made = device.empty(8 * plan.n_rows * plan.n_columns)
     values = (b * held.wave)[held.order]
     device.run(
-        held.spread, *shared_tile.launch(device, (n_tiles, plan.n_rows // plan.tile)),
+        held.spread, *shared_tile.launch(device, (n_tiles, plan.n_rows // plan.tile), held.grouped),
         device.upload(values), held.first, held.rest, held.start, held.table, n_tiles, 0, made,
     )  # fmt: skip
     grid = device.download(made, np.empty((plan.n_rows, plan.n_columns), np.complex64))
