@@ -92,10 +92,7 @@ def _prepared(plan: ScenePlan, *, tiled: bool, exact: bool) -> SceneEchoes:
         behind = FacetsBehindSheets.of(request, seen, cut.host, subdivision.plan, plan.error_budget)
         if behind is not None:
             skipped["shadowed"] -= behind.n_dark * len(seen.antennas)
-    highest = seen.waveform.center + seen.waveform.bandwidth / 2
-    bounced = BounceScene.of(seen.scene, request.bounces, plan.error_budget, highest, request.host)
-    if bounced is not None:
-        bounced.refuse_many(seen.antennas.tx, seen.antennas.rx)
+    bounced = _bounced(plan)
     if bounced is None and behind is None:
         _check_left(request, points, facets, skipped)
     if points is not None:
@@ -122,6 +119,16 @@ def _prepared(plan: ScenePlan, *, tiled: bool, exact: bool) -> SceneEchoes:
     request.clock.lap("scene")
     prepared.check_plans(seen.antennas, plan.bands)
     return prepared
+
+
+def _bounced(plan: ScenePlan) -> BounceScene | None:
+    """Facets of several reflections, None where only single ones are asked for. MemoryError for too many ways."""
+    request, seen = plan.request, plan.seen
+    highest = seen.waveform.center + seen.waveform.bandwidth / 2
+    bounced = BounceScene.of(seen.scene, request.bounces, plan.error_budget, highest, request.host)
+    if bounced is not None:
+        bounced.refuse_many(seen.antennas.tx, seen.antennas.rx)
+    return bounced
 
 
 def _check_left(
