@@ -85,8 +85,8 @@ def torch_function(operator: Echoes) -> Callable[..., object]:
         @staticmethod
         @torch.autograd.function.once_differentiable
         def backward(ctx, y):
-            found = ctx.applied.gradients(_array(y))
-            each = (_like(torch, found[name], kind) for name, kind in zip(("x", *ctx.names), ctx.kinds, strict=True))
+            gradients = ctx.applied.gradients(_array(y))
+            each = (_like(torch, gradients[name], kind) for name, kind in zip(("x", *ctx.names), ctx.kinds, strict=True))
             of_x, *others = each
             return (of_x, None, *others)
 
@@ -158,10 +158,10 @@ def jax_function(operator: Echoes) -> Callable[..., object]:
 
     def gradients_on_host(x, values, y):
         applied = Applied(operator, np.asarray(x), {k: np.asarray(v) for k, v in values.items()})
-        found = applied.gradients(np.asarray(y).conj())
-        of_x = found.pop("x").conj()
+        gradients = applied.gradients(np.asarray(y).conj())
+        of_x = gradients.pop("x").conj()
         of_x = (of_x if np.iscomplexobj(x) else of_x.real).astype(x.dtype)
-        return of_x, {name: np.asarray(found[name], values[name].dtype) for name in values}
+        return of_x, {name: np.asarray(gradients[name], values[name].dtype) for name in values}
 
     @jax.custom_vjp
     def apply(x, values):

@@ -58,12 +58,12 @@ def _moved(measurement: Measurement, known: TransposedImage) -> MethodChoice | N
     task, plan, tiling = measurement.task, known.plan, known.tiling
     if task.grid.size != tiling.grid.size or task.raw.n_samples != known.task.raw.n_samples:
         return None
-    here = tiling_of(task.grid, tiling.side)
+    new_tiling = tiling_of(task.grid, tiling.side)
     before, now = (
         range_error_float64(tiles.radius, of.antennas.distance(of.grid.bounds), of.highest, plan.order)
-        for tiles, of in ((tiling, known.task), (here, task))
+        for tiles, of in ((tiling, known.task), (new_tiling, task))
     )
-    return replace(known.choice, tiling=here, predicted_error=known.predicted_error + max(now - before, 0.0))
+    return replace(known.choice, tiling=new_tiling, predicted_error=known.predicted_error + max(now - before, 0.0))
 
 
 def _patches(measurement: Measurement) -> PatchSamples:

@@ -159,14 +159,14 @@ class FacetNorm:
             seen = self._sees(on_facets, self._numbers[of], ends)
             q = unit(ends[0] - places) + unit(ends[1] - places)
             path = path_beyond(ends, middle[of], places - middle[of])
-            whole, lit = np.zeros(n_planes), np.zeros(n_planes)
+            unshaded, lit = np.zeros(n_planes), np.zeros(n_planes)
             for k in self._wavenumbers[self._group[of]].T:
                 integrals = triangle_integral(parts, k[:, None] * q) * np.exp(-1j * k * path)
                 sums = group_sums(of, seen * integrals, len(triangles))
                 facets += np.abs(sums) ** 2
                 lit += np.abs(group_sums(self._group, sums, n_planes)) ** 2
-                whole += np.abs(group_sums(self._group[of], integrals, n_planes)) ** 2
-            planes += np.minimum(whole, lit)  # a shadow that ends in steps of the parts' size has an echo of its own
+                unshaded += np.abs(group_sums(self._group[of], integrals, n_planes)) ** 2
+            planes += np.minimum(unshaded, lit)  # a shadow that ends in steps of the parts' size has an echo of its own
         return facets, planes
 
 

@@ -97,9 +97,9 @@ class ThinSheets:
             for column, through in zip(clear.T, ways, strict=True):
                 column[self.rows[np.isin(self.group, list(through))]] = True
             solid = ~clear.all(axis=1)
-            some = replace(pieces, clear=clear[solid] if clear[solid].any() else None)
+            unshaded = replace(pieces, clear=clear[solid] if clear[solid].any() else None)
             past = self.scene.triangles[solid]
-            out[ways] = LitParts(device, some, past, antennas, max_bytes=max_bytes, progress=progress)
+            out[ways] = LitParts(device, unshaded, past, antennas, max_bytes=max_bytes, progress=progress)
         return out
 
     def transmission(

@@ -17,5 +17,5 @@ def names_of(xml: str | None) -> dict[str, str]:
         root = ElementTree.fromstring(xml)
     except ElementTree.ParseError:  # text that a user gave
         return {}
-    found = {name: root.findtext("/".join(f"{{*}}{part}" for part in path.split("/"))) for name, path in NAMES.items()}
-    return {name: text.strip() for name, text in found.items() if text and text.strip()}
+    texts = {name: root.findtext("/".join(f"{{*}}{part}" for part in path.split("/"))) for name, path in NAMES.items()}
+    return {name: text.strip() for name, text in texts.items() if text and text.strip()}

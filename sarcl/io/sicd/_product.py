@@ -137,7 +137,7 @@ def _put_collection(root: Element, product: Product) -> None:
 def _put_formation(root: Element, product: Product) -> None:
     """How the image was formed: by sums over pulses, which the standard has no name for."""
     parameters = {"gain": None if product.gain is None else repr(float(product.gain)), "window": product.window}
-    given = [(name, text) for name, text in parameters.items() if text is not None]
+    pairs = [(name, text) for name, text in parameters.items() if text is not None]
     root["ImageFormation"] = {
         "RcvChanProc": {"NumChanProc": 1, "ChanIndex": [1]},
         "TxRcvPolarizationProc": ":".join(product.polarization),
@@ -148,5 +148,5 @@ def _put_formation(root: Element, product: Product) -> None:
         "STBeamComp": "NO",
         "ImageBeamComp": "NO",
         **{name: product.names.get(name, "NO") for name in ("AzAutofocus", "RgAutofocus")},
-        "Processing": [{"Type": PARAMETERS, "Applied": True, **({"Parameter": given} if given else {})}],
+        "Processing": [{"Type": PARAMETERS, "Applied": True, **({"Parameter": pairs} if pairs else {})}],
     }

@@ -113,8 +113,8 @@ class Resampling:
         cell = (low + high) // 2
         middle = self.source.positions(*(slice(n, n + 1) for n in np.minimum(cell, np.array(self.image.shape) - 1)))[0]
         if np.isnan(middle).any():
-            some = self.source.positions(slice(low[0], high[0]), slice(low[1], high[1])).reshape(-1, 3)
-            middle = some[np.isfinite(some[:, 0])][:1]
+            places = self.source.positions(slice(low[0], high[0]), slice(low[1], high[1])).reshape(-1, 3)
+            middle = places[np.isfinite(places[:, 0])][:1]
         tx, rx = antennas_of(self.image, "a map of a complex image", middle)
         if self.image.frequency is None:
             raise ValueError(

@@ -268,9 +268,9 @@ def _directions(
     sizes = np.ptp(every, axis=-1)
     largest = sizes.max(axis=0)
     at_scp = aperture.spans(scp[None], axes)[0].mean(axis=-1)
-    given = words.values.get("ImpRespWid")
-    if given is not None:
-        widths = validation.array("metadata['ImpRespWid']", given, np.float64, (2,))
+    response = words.values.get("ImpRespWid")
+    if response is not None:
+        widths = validation.array("metadata['ImpRespWid']", response, np.float64, (2,))
     else:
         widths = _widths(image, aperture, scp, axes)
     out = []

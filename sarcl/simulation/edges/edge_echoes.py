@@ -179,8 +179,8 @@ class EdgeEchoes:
         if not len(self):
             return iter(())
         pieces = len(self) + len(self.pairs)
-        held = pieces * n_frequencies * len(self.view.polarizations)
-        n = max(min(TOGETHER // pieces, AMPLITUDES // held), 1)
+        amplitudes = pieces * n_frequencies * len(self.view.polarizations)
+        n = max(min(TOGETHER // pieces, AMPLITUDES // amplitudes), 1)
         return (slice(first, min(first + n, n_pulses)) for first in range(0, n_pulses, n))
 
     def _seen(self, pulses: np.ndarray, frequencies: np.ndarray) -> _Seen:
