@@ -85,9 +85,8 @@ def torch_function(operator: Echoes) -> Callable[..., object]:
         @staticmethod
         @torch.autograd.function.once_differentiable
         def backward(ctx, y):
-            gradients = ctx.applied.gradients(_array(y))
-            each = (_like(torch, gradients[name], kind) for name, kind in zip(("x", *ctx.names), ctx.kinds, strict=True))
-            of_x, *others = each
+            gradients, names = ctx.applied.gradients(_array(y)), ("x", *ctx.names)
+            of_x, *others = (_like(torch, gradients[name], kind) for name, kind in zip(names, ctx.kinds, strict=True))
             return (of_x, None, *others)
 
     def function(x, **values):

@@ -12,7 +12,7 @@ import numpy as np
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.errors import warn
 from ..formats import Make, T
-from ..sarkit_library import Element, Reader, Refused, damage, opened, text_of
+from ..sarkit_library import Element, Reader, Refused, made_of, opened, parsing, text_of
 from ..sarkit_library import library as sarkit_module
 from ._channels import Channel, channels_of, chosen
 from ._domains import baseband, n_frequencies
@@ -39,9 +39,8 @@ def load(
     +1 nor -1, per-vector parameters that are not finite or zero, channels that do not fit. ImportError without sarkit.
     """
     library = sarkit_module("cphd")
-    file, name = opened(source)
-    try:
-        try:
+    with opened(source) as (file, name):
+        with parsing(name):
             reader = _reader(library, file)
             root = reader.metadata.xmltree.getroot()
             _check_kind(root)
@@ -53,23 +52,12 @@ def load(
             if np.array_equal(fields["rx"], fields["tx"]):
                 fields["rx"] = None
             fields |= {"image_area": area, "metadata": _text(reader)}
-        except Refused as exc:
-            raise ValueError(f"{name} {exc}") from None
-        except Exception as exc:  # of the library, of lxml and of text that is no number
-            raise ValueError(f"{name} {damage(exc)}") from exc
         if coupling > COUPLING:
             warn(
                 f"{name}: range and Doppler are coupled (aFRR1), which is not corrected: targets in the corners of the "
                 f"image area are moved by {coupling:.1%} of the range resolution"
             )
-        try:
-            return make("phase history", fields)
-        except ValueError as exc:
-            raise ValueError(f"{name}: {exc}") from None
-    except BaseException:
-        if file is not source:
-            file.close()
-        raise
+        return made_of(make, "phase history", fields, name)
 
 
 def _reader(library: ModuleType, file: IO[bytes]) -> Reader:

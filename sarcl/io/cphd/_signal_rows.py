@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import threading
 from dataclasses import dataclass
-from typing import IO, NoReturn
+from typing import IO
 
 import numpy as np
 
-from ..sarkit_library import Reader, stamp
+from ..sarkit_library import FileRows, Reader
 from . import _domains
 
 
@@ -48,11 +47,10 @@ class Conversion:
         return samples.astype(np.complex64)
 
 
-class SignalRows:
+class SignalRows(FileRows):
     """FX samples (n_rows, n_samples), complex64, of one channel; a slice reads its rows.
 
     filename  of the file, where it is one on a disk
-    OSError where the file has changed since it was opened, or ends too early.
     """
 
     dtype = np.dtype(np.complex64)
@@ -61,9 +59,9 @@ class SignalRows:
         self, reader: Reader, file: IO[bytes], channel: str, vectors: np.ndarray, how: Conversion, n: int
     ) -> None:
         """reader  sarkit's, of the open file;  vectors  of each row, increasing;  n  frequencies of a row"""
-        self._reader, self._file, self._channel, self._vectors, self._how = reader, file, channel, vectors, how
+        super().__init__(file, "samples", "dataclasses.replace(raw, samples=raw.read(0, raw.n_rows))")
+        self._reader, self._channel, self._vectors, self._how = reader, channel, vectors, how
         self.shape = (len(vectors), n)
-        self._lock, self._stamp = threading.Lock(), stamp(file)
         name = getattr(file, "name", None)
         self.filename = name if isinstance(name, str) and self._stamp is not None else None
 
@@ -72,33 +70,11 @@ class SignalRows:
         if stop <= start:
             return np.empty((0, self.shape[1]), self.dtype)
         vectors = self._vectors[start:stop]
-        first = int(vectors[0])
-        with self._lock:
-            self._check()
-            try:
-                samples = self._reader.read_signal(self._channel, start_vector=first, stop_vector=int(vectors[-1]) + 1)
-            except Exception as exc:  # of the library and of file objects, which fail in many ways
-                raise OSError(
-                    f"{self._name} cannot be read at vectors {first} to {int(vectors[-1])} of channel "
-                    f"{self._channel!r} ({exc}); it is truncated, or was closed: copy it again, or open it again"
-                ) from exc
-            self._check()
+        first, last = int(vectors[0]), int(vectors[-1])
+        samples = self._of_file(
+            f"vectors {first} to {last} of channel {self._channel!r}",
+            lambda: self._reader.read_signal(self._channel, start_vector=first, stop_vector=last + 1),
+        )
         if len(vectors) < len(samples):  # some have no signal
             samples = samples[vectors - first]
         return self._how.converted(samples, slice(start, stop), self.shape[1])
-
-    def __reduce__(self) -> NoReturn:
-        """Refused: copy, pickle and multiprocessing cannot hand an open file on."""
-        raise TypeError(
-            f"the samples are rows of the open file {self._name}, which cannot be copied or sent to another process: "
-            "read the file there, sarcl.read(path), or take them into memory first, such as "
-            "dataclasses.replace(raw, samples=raw.read(0, raw.n_rows))"
-        )
-
-    @property
-    def _name(self) -> str:
-        return repr(getattr(self._file, "name", "the file object"))
-
-    def _check(self) -> None:
-        if stamp(self._file) != self._stamp:
-            raise OSError(f"{self._name} has changed since it was opened; read it again with sarcl.read")

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import threading
 from dataclasses import dataclass
-from typing import IO, Any, NoReturn
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import DTypeLike
 
-from ..sarkit_library import Reader, stamp
+from ..sarkit_library import FileRows, Reader
 
 NEGLIGIBLE = 1e-12  # of a cycle, by which a frequency misses a whole number of quarters per pixel: rounding
 
@@ -74,19 +73,18 @@ def turned(values: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.ndar
     return out
 
 
-class PixelRows:
+class PixelRows(FileRows):
     """Pixels (rows, columns), complex64, the last row of the file first; a slice reads its rows.
 
-    ValueError names a pixel that is not finite; OSError where the file has changed since it was opened.
+    ValueError names a pixel that is not finite.
     """
 
     dtype = np.dtype(np.complex64)
     ndim = 2
 
     def __init__(self, reader: Reader, file: IO[bytes], shape: tuple[int, int], phase: Phase) -> None:
-        self._reader, self._file, self._phase = reader, file, phase
-        self.shape = shape
-        self._lock, self._stamp = threading.Lock(), stamp(file)
+        super().__init__(file, "pixels", "dataclasses.replace(image, data=numpy.asarray(image))")
+        self._reader, self._phase, self.shape = reader, phase, shape
 
     def __getitem__(self, index: Any) -> np.ndarray:
         first, rest = (index[0], index[1:]) if isinstance(index, tuple) and index else (index, ())
@@ -105,30 +103,11 @@ class PixelRows:
     def __len__(self) -> int:
         return self.shape[0]
 
-    def __reduce__(self) -> NoReturn:
-        """Refused: copy, pickle and multiprocessing cannot hand an open file on."""
-        raise TypeError(
-            f"the pixels are rows of the open file {self._name}, which cannot be copied or sent to another process: "
-            "read the file there, sarcl.read(path), or take them into memory first, such as "
-            "dataclasses.replace(image, data=numpy.asarray(image))"
-        )
-
-    @property
-    def _name(self) -> str:
-        return repr(getattr(self._file, "name", "the file object"))
-
     def _rows(self, low: int, high: int) -> np.ndarray:
         start, stop = self.shape[0] - high, self.shape[0] - low
-        with self._lock:
-            self._check()
-            try:
-                pixels = self._reader.read_sub_image(start_row=start, stop_row=stop)[0]
-            except Exception as exc:  # of the library and of file objects, which fail in many ways
-                raise OSError(
-                    f"{self._name} cannot be read at rows {start} to {stop - 1} ({exc}); it is truncated, or was "
-                    "closed: copy it again, or open it again"
-                ) from exc
-            self._check()
+        pixels = self._of_file(
+            f"rows {start} to {stop - 1}", lambda: self._reader.read_sub_image(start_row=start, stop_row=stop)[0]
+        )
         values = self._phase.converted(pixels, start)[::-1]
         if not np.isfinite(values).all():
             row, column = (int(k) for k in np.argwhere(~np.isfinite(values))[0])
@@ -137,7 +116,3 @@ class PixelRows:
                 "finite one; read other rows, or have it written with 0 there"
             )
         return values
-
-    def _check(self) -> None:
-        if stamp(self._file) != self._stamp:
-            raise OSError(f"{self._name} has changed since it was opened; read it again with sarcl.read")

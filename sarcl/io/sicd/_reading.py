@@ -11,7 +11,7 @@ import numpy as np
 
 from ...base.errors import warn
 from ..formats import Make, T
-from ..sarkit_library import Element, Reader, Refused, damage, opened, text_of
+from ..sarkit_library import Element, Reader, Refused, made_of, opened, parsing, text_of
 from ..sarkit_library import library as sarkit_module
 from ._pixel_rows import Phase, PixelRows
 from ._product import PARAMETERS, SIDES
@@ -30,30 +30,18 @@ def load(source: Path | IO[bytes], make: Make[T]) -> T:
     another type. ImportError without sarkit.
     """
     library = sarkit_module("sicd")
-    file, name = opened(source)
-    try:
-        try:
+    with opened(source) as (file, name):
+        with parsing(name):
             reader = _reader(library, file)
             fields = _fields(library, reader, file)
-        except Refused as exc:
-            raise ValueError(f"{name} {exc}") from None
-        except Exception as exc:  # of the library, of lxml and of text that is no number
-            raise ValueError(f"{name} {damage(exc)}") from exc
         distance = _distance(library, reader, fields["grid"])
-        if distance > FAR * max(fields["grid"]["spacing"]):
+        if not distance <= FAR * max(fields["grid"]["spacing"]):
+            how_far = f"up to {distance:.2g} m" if distance == distance else "it does not say how far"
             warn(
                 f"{name}: this grid ({text_of(reader.metadata.xmltree.getroot(), 'Grid/Type')}) shows points of the "
-                f"scene up to {distance:.2g} m from where its plane has their pixels; sarkit.sicd.projection has exact "
-                "places"
+                f"scene {how_far} from where its plane has their pixels; sarkit.sicd.projection has exact places"
             )
-        try:
-            return make("image", fields)
-        except ValueError as exc:
-            raise ValueError(f"{name}: {exc}") from None
-    except BaseException:
-        if file is not source:
-            file.close()
-        raise
+        return made_of(make, "image", fields, name)
 
 
 def _reader(library: ModuleType, file: IO[bytes]) -> Reader:
@@ -201,7 +189,7 @@ def _phase(library: ModuleType, root: Element) -> Phase:
 def _distance(library: ModuleType, reader: Reader, grid: dict[str, Any]) -> float:
     """Distance, m, from where the corners of the plane lie to what the file shows there, by the standard's projection.
 
-    0 where the file lacks what the projection needs.
+    Where the file lacks what the projection needs nan, and 0 of a PLANE grid, whose pixels lie there by definition.
     """
     from dataclasses import replace
 
@@ -228,4 +216,4 @@ def _distance(library: ModuleType, reader: Reader, grid: dict[str, Any]) -> floa
             distances.append(float(np.hypot(*((of_file - of_plane) * [1, reach / speed]))))
         return max(distances)
     except Exception:  # of the library: what a file of an image may lack
-        return 0.0
+        return 0.0 if text_of(tree.getroot(), "Grid/Type") == "PLANE" else float("nan")
