@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import logging
 import os
 import threading
 from collections.abc import Callable, Iterator
@@ -19,6 +20,7 @@ if TYPE_CHECKING:  # NumPy is loaded late
 
 Element: TypeAlias = Any  # of lxml, or wrapped by sarkit: neither has types
 Reader: TypeAlias = Any  # of sarkit
+_NO_LOG = logging.NullHandler()
 
 
 class OpenFile(io.BufferedReader):
@@ -34,6 +36,8 @@ class Refused(Exception):
 
 def library(name: Literal["cphd", "sicd"]) -> ModuleType:
     """sarkit.cphd or sarkit.sicd; ImportError names the extra that has it."""
+    # of damaged files jbpy, its reader of NITF, logs every field with a traceback, on stderr where nobody handles logs
+    logging.getLogger("jbpy").addHandler(_NO_LOG)
     try:
         return import_module(f"sarkit.{name}")
     except ImportError as exc:

@@ -235,6 +235,14 @@ def test_changed_bytes_are_an_error_or_an_image(base, tmp_path):
             assert "x.nitf" in str(exc)
 
 
+def test_a_damaged_file_is_one_error_and_nothing_else_on_stderr(base, tmp_path):
+    path = tmp_path / "x.nitf"
+    path.write_bytes(base[0].read_bytes()[:9000])
+    code = f"import sarcl\ntry:\n    sarcl.read({str(path)!r})\nexcept ValueError as exc:\n    print(exc)"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert "x.nitf' is truncated or damaged" in run.stdout and run.stderr == ""
+
+
 def test_nitf_without_sicd_is_refused(tmp_path):
     import jbpy
 

@@ -38,7 +38,7 @@ class MapAxes(NamedTuple):
         if (north - south < dy and east - west < dx) or rows * columns > 2**40:
             raise ValueError(
                 f"spacing ({dy:g}, {dx:g}) and bounds ({west:g}, {south:g}, {east:g}, {north:g}) give {rows} x "
-                f"{columns} pixels; give both in units of the CRS ({unit})"
+                f"{columns} pixels; give both in units of the CRS ({unit}), for 2 to 1e12 pixels"
             )
         return cls(west + dx / 2, south + dy / 2, dx, dy, (rows, columns))
 
