@@ -36,14 +36,16 @@ class Refused(Exception):
 
 def library(name: Literal["cphd", "sicd"]) -> ModuleType:
     """sarkit.cphd or sarkit.sicd; ImportError names the extra that has it."""
-    # of damaged files jbpy, its reader of NITF, logs every field with a traceback, on stderr where nobody handles logs
-    logging.getLogger("jbpy").addHandler(_NO_LOG)
     try:
-        return import_module(f"sarkit.{name}")
+        module = import_module(f"sarkit.{name}")
+        nitf = import_module("jbpy")  # sarkit's reader of NITF
     except ImportError as exc:
         raise ImportError(
             f"{name.upper()} files need the package sarkit, with NumPy 2: pip install sarcl[formats] ({exc})"
         ) from exc
+    # of damaged files it logs every field with a traceback, on stderr where nobody handles logs
+    logging.getLogger(nitf.__name__).addHandler(_NO_LOG)
+    return module
 
 
 @contextmanager
