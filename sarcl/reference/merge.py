@@ -47,9 +47,12 @@ def expand(
     """
     out = np.empty((raw.n_rows, raw.n_samples), np.complex128)
     n = np.arange(raw.n_samples) - raw.n_samples // 2
-    for p in range(raw.n_rows):
-        delta = float(half_path(raw.tx[p], raw.rx[p], center[None], raw.reference_range[p])[0])
-        carrier = raw.frequency[p] + raw.n_samples // 2 * raw.frequency_step[p]
-        cycles = carrier * delta + raw.frequency_step[p] * np.outer(n, delta + offsets)
-        out[p] = np.exp(-4j * np.pi / SPEED_OF_LIGHT * cycles) @ (weights[p] @ profiles[kept[p]])
+    wavenumber = -4j * np.pi / SPEED_OF_LIGHT  # times a frequency
+    for step in np.unique(raw.frequency_step):  # exp(-j 2 pi (f - f_c) 2 offset/c) is that of all rows with this step
+        rows = np.flatnonzero(raw.frequency_step == step)
+        interpolated = np.stack([weights[p] @ profiles[kept[p]] for p in rows])
+        out[rows] = interpolated @ np.exp(wavenumber * step * np.outer(offsets, n))
+        for p in rows:
+            delta = float(half_path(raw.tx[p], raw.rx[p], center[None], raw.reference_range[p])[0])
+            out[p] *= np.exp(wavenumber * delta * (raw.frequency[p] + (raw.n_samples // 2 + n) * step))
     return out

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.array_cases import TONE, line, passing
-from helpers.cases import SCENARIO, noise_history, noise_on, planned_within, straight
+from helpers.cases import SCENARIO, noise_history, noise_on, planned_within, quick_of, straight
 
 import sarcl
 from sarcl import pointing, shapes
@@ -112,9 +112,7 @@ REFUSED = {
 
 
 @pytest.mark.filterwarnings("ignore::sarcl.SarclWarning")
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=[pytest.mark.slow] if "too many" in n else []) for n in REFUSED]
-)
+@pytest.mark.parametrize("name", quick_of([name for name in REFUSED if "too many" not in name][::2], REFUSED))
 def test_a_refusal_is_in_the_numbers_asked_for_and_its_best_works(name):
     make, asked, limit = REFUSED[name]
     with pytest.raises(ToleranceUnreachable) as caught:

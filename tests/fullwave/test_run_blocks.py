@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.block_runs import Stopped, begin_earlier, names, tiles
+from helpers.cases import quick_of
 from helpers.devices import as_gpu
 
 import sarcl
@@ -93,7 +94,7 @@ def stop_after(n_runs):
 # ---- pieces
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", quick_of(["all", "parts"], CASES))
 def test_pieces_in_any_order_have_the_bits_of_one_call(case, whole, tmp_path):
     order = (2, 1) if case != "all" else (3, 1, 4, 2)
     pieces = [of(case, out=tmp_path / "a.h5", tile=(i, len(order))) for i in order]
@@ -185,7 +186,7 @@ OTHER = {
 }
 
 
-@pytest.mark.parametrize("name", OTHER)
+@pytest.mark.parametrize("name", quick_of(["scene", "track", "tolerance"], OTHER))
 def test_runs_of_other_echoes_are_refused_with_what_differs(tmp_path, name):
     options, message = OTHER[name]
     given = {"track": MIRRORED, "anchors": [0, 1], "out": tmp_path / "a.h5"}
@@ -234,7 +235,7 @@ def test_killed_calls_lose_the_run_in_progress_alone_and_end_with_the_same_bits(
 # ---- several devices
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", quick_of(["auto", "mirrored"], CASES))
 def test_two_devices_of_a_kind_make_the_bits_of_one(case, pair, whole):
     both = of(case, device=pair)
     assert same(both, whole(case)) and both.report.device == f"{pair[0].info.name} + {pair[1].info.name}"

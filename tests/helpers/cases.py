@@ -89,6 +89,11 @@ def planned_within(limits, verb, *subjects, **options):
     return replace(plan, task=replace(plan.task, request=request))
 
 
+def quick_of(quick, values):
+    """`values` as parameters; those that are not in `quick` are slow."""
+    return [pytest.param(*_tuple(value), marks=[] if value in quick else pytest.mark.slow) for value in values]
+
+
 def thinned(first, second, every=2, slow=None):
     """Pairs of two lists as parameters, their tuples flattened; the quick ones lie `every` apart along both lists.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from helpers.cases import thinned
+from helpers.cases import quick_of, thinned
 from helpers.facet_cases import WET, plate, seen_from, still
 
 import sarcl
@@ -97,7 +97,12 @@ def test_points_send_back_what_they_are_sent():
     assert power[[0, 3]] == pytest.approx(9, rel=1e-3) and not power[[1, 2]].any()
 
 
-@pytest.mark.parametrize("angle, dbsm", [(0, 1.0302), (5, -3.7595), (10, -21.2624), (20, -23.5638), (60, -29.9208)])
+@pytest.mark.parametrize(
+    "angle, dbsm",
+    quick_of(
+        [(0, 1.0302), (20, -23.5638)], [(0, 1.0302), (5, -3.7595), (10, -21.2624), (20, -23.5638), (60, -29.9208)]
+    ),
+)
 def test_a_small_plate_off_its_normal(device, angle, dbsm):
     # (4 pi A^2/lambda^2) cos^2 t sinc^2(k a sin t): side a = 10.16 cm, wavelength 3.25 cm; to 0.01 dB off the nulls
     tone = sarcl.Waveform.chirp(center=SPEED_OF_LIGHT / 0.0325, bandwidth=1e6, duration=1e-6)

@@ -163,7 +163,7 @@ SCENES = {
 
 
 @pytest.mark.parametrize("name", [
-    "terrain", "two-sided sheets", pytest.param("a slab on terrain, in shadow", marks=pytest.mark.costly), *(
+    "terrain", "two-sided sheets", pytest.param("a slab on terrain, in shadow", marks=pytest.mark.slow), *(
     pytest.param(name, marks=REPEATED) for name in ("random heights", "terrain that hides nothing", "a box on terrain",
                                                     "a smooth box on terrain")
 )])  # fmt: skip

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.block_runs import Stopped, begin_earlier, names, observe, observe_devices, tiles
+from helpers.cases import quick_of
 from helpers.devices import as_gpu
 
 import sarcl
@@ -90,7 +91,7 @@ def half_done(path, scene=POINTS, **options):
 # ---- pieces
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", quick_of(["points", "partly lit", "rough", "between"], CASES))
 def test_pieces_in_any_order_have_the_bits_of_one_run(case, tmp_path):
     scene, options = CASES[case]
     one, numbers = echo(scene, **options), (2, 5) if case == "points" else (3,)
@@ -271,7 +272,7 @@ def test_killed_runs_lose_no_tile_and_end_with_the_same_bits(tmp_path, kills):
 # ---- several devices
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", quick_of(["by levels", "facets", "array"], CASES))
 def test_two_devices_of_a_kind_make_the_bits_of_one(case, pair, monkeypatch):
     scene, options = CASES[case]
     one = echo(scene, **options)
