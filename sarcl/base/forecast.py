@@ -9,12 +9,12 @@ from math import isnan
 from typing import Generic, Protocol, TypeVar
 
 from .report import ErrorTerm
-from .text import NotebookTable, duration, size_text
+from .text import NotebookTable, detail_text, duration, size_text
 
 R_co = TypeVar("R_co", covariant=True)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Forecast(NotebookTable, Generic[R_co]):
     """Forecast of a verb with the same arguments: `sarcl.plan(verb, ...)` makes it.
 
@@ -41,14 +41,14 @@ class Forecast(NotebookTable, Generic[R_co]):
     seconds: float
     bytes: float
     predicted_error: float
-    run: Callable[[], R_co] = field(repr=False)
+    run: Callable[[], R_co]
     error_terms: tuple[ErrorTerm, ...] = ()
     n_rows: int | None = None
     n_samples: int | None = None
     model_error: float | None = None
     work: str = ""
     planning: float = 0.0
-    search_cheaper: Callable[[], tuple[float, float] | None] = field(default=lambda: None, repr=False)
+    search_cheaper: Callable[[], tuple[float, float] | None] = field(default=lambda: None)
 
     @functools.cached_property
     def cheaper(self) -> tuple[float, float] | None:
@@ -65,18 +65,23 @@ class Forecast(NotebookTable, Generic[R_co]):
         yield from ((f"of which {term.name}", f"{term.value:.1e}: {term.remedy}") for term in self.error_terms)
         if self.cheaper:
             yield "next cheaper plan", f"{self.cheaper[0]:.1e} in {duration(self.cheaper[1])}"
-        yield "plan", ", ".join(f"{name} {value}" for name, value in self.plan.items())
+        yield "plan", ", ".join(detail_text(name, value) for name, value in self.plan.items())
         if self.work:
             yield "work", self.work
 
     def __str__(self) -> str:
-        rows = "" if self.n_rows is None else f"{self.n_rows} rows of {self.n_samples} samples, "
-        text = f"{self.method}: {rows}about {duration(self.seconds)}, {size_text(self.bytes)}"
-        error = "known after the run" if isnan(self.predicted_error) else f"below {self.predicted_error:.1e}"
-        text += f", error {error}"
+        text = self._summary()
         if self.cheaper:
             text += f" (next cheaper plan: {self.cheaper[0]:.1e} in {duration(self.cheaper[1])})"
         return f"{text}\n{self.work}" if self.work else text
+
+    def __repr__(self) -> str:
+        return f"<Forecast {self._summary()}>"
+
+    def _summary(self) -> str:
+        rows = "" if self.n_rows is None else f"{self.n_rows} rows of {self.n_samples} samples, "
+        error = "known after the run" if isnan(self.predicted_error) else f"below {self.predicted_error:.1e}"
+        return f"{self.method}: {rows}about {duration(self.seconds)}, {size_text(self.bytes)}, error {error}"
 
 
 class Plan(Protocol[R_co]):

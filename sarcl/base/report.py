@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, field
 from types import MappingProxyType
 from typing import Any
 
-from .text import NotebookTable
+from .text import NotebookTable, detail_text, duration
 
 SHOWN = 1e-2  # of the predicted error: smaller terms are left out of the text of a report
 SMALLER_TOLERANCE = "a smaller tolerance"  # the remedy of an error term that a plan makes as large as it may be
@@ -93,7 +93,7 @@ class Report(NotebookTable):
 
     def _notebook_rows(self) -> Iterator[tuple[str, str]]:
         yield "device", self.device
-        yield "plan", ", ".join(f"{k} {v}" for k, v in self.plan.items())
+        yield "plan", ", ".join(detail_text(name, value) for name, value in self.plan.items())
         error = "not measured" if self.measured_error is None else f"{self.measured_error:.1e} measured"
         yield "error", f"{self.tolerance:.1e} asked, {self.predicted_error:.1e} predicted, {error}"
         terms = [term for term in self.error_terms if term.value >= SHOWN * self.predicted_error]
@@ -105,7 +105,7 @@ class Report(NotebookTable):
             yield "contrast", f"trusted down to {self.dynamic_range_db:.0f} dB below what is bright in the same rows"
         yield "done", f"{self.contributions_done:.3e} contributions"
         yield from (("skipped", f"{n:.3e} {why}") for why, n in self.contributions_skipped.items() if n)
-        yield "seconds", ", ".join(f"{k} {v:.2f}" for k, v in self.seconds.items())
+        yield "time", ", ".join(f"{stage} {duration(s)}" for stage, s in self.seconds.items())
 
     def __str__(self) -> str:
         return "\n".join(f"{name:<12}{value}" for name, value in self._notebook_rows())

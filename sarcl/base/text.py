@@ -22,10 +22,23 @@ def tolerance_text(value: float) -> str:
 
 
 def duration(seconds: float) -> str:
-    """A duration in seconds, minutes or hours, whichever is shortest to read: "2.5 s", "12 min"."""
+    """A duration that a person can plan with, with the digits an estimate has: "25 ms", "2.5 s", "3 h 20 min"."""
     if seconds < 120:
-        return f"{seconds:.2g} s"
-    return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"
+        text = f"{seconds:.2g} s" if seconds < 9.95 else f"{seconds:.0f} s"
+        return f"{1e3 * seconds:.2g} ms" if 0 < seconds < 0.0995 else text
+    if seconds < 7170:
+        return f"{seconds / 60:.0f} min"
+    hours, minutes = divmod(round(seconds / 600) * 10, 60)
+    if hours >= 48:
+        return f"{seconds / 86400:.2g} days" if seconds < 99.5 * 86400 else f"{seconds / 86400:.0f} days"
+    return f"{hours} h {minutes} min" if minutes and hours < 10 else f"{round(seconds / 3600)} h"
+
+
+def detail_text(name: str, value: object) -> str:
+    """A detail of a plan or report: its name and value; floats with four digits, seconds as a duration."""
+    if isinstance(value, float):
+        value = duration(value) if name.endswith("seconds") else f"{value:.4g}"
+    return f"{name} {value}"
 
 
 def rate_text(rate: float) -> str:

@@ -14,6 +14,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..base.text import duration
 from ..io import formats, input_paths, output_paths
 from ._job import Job, Outputs
 from ._pages import bench, fda, papers
@@ -326,8 +327,8 @@ def _say_piece(path: str | None, job: Job) -> None:
 def _say_report(what: str, report: Report | None, job: Job) -> None:
     if report is None:
         return
-    steps = ", ".join(f"{stage} {s:.1f}" for stage, s in report.seconds.items() if s >= 0.05)
-    job.say(f"{what}: {sum(report.seconds.values()):.1f} s on {report.device}" + (steps and f" ({steps})"))
+    steps = ", ".join(f"{stage} {duration(s)}" for stage, s in report.seconds.items() if s >= 0.05)
+    job.say(f"{what}: {duration(sum(report.seconds.values()))} on {report.device}" + (steps and f" ({steps})"))
     error = f"error {report.tolerance:.1e} allowed, {report.predicted_error:.1e} predicted"
     if report.measured_error is not None:
         error += f", {report.measured_error:.1e} measured at random places"

@@ -4,7 +4,7 @@ For other folders:
 
     cut_plot   curves in decibels in one frame, with Pillow
     decibels   grey images and line plots in decibels, with Pillow
-    html       a page in one file: headings, tables, figures; needs the extra `plots`
+    html       a page in one file: strip of pictures, tables, figures; needs the extra `plots`
     plots      plots as PNG files, with matplotlib; needs the extra `plots`
 
 For this folder alone:

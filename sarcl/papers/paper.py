@@ -12,8 +12,9 @@ from typing import Any, Literal
 
 import numpy as np
 
+from ..base.text import duration
 from ..figures import html
-from ..figures.html import Block, heading, listed, page, table, terms, words
+from ..figures.html import Block, heading, listed, page, strip, table, terms, words
 from ..figures.plots import Curve
 from . import PAPERS
 
@@ -239,71 +240,68 @@ class Paper:
         }
 
     def html(self, sections: Sequence[Section], quick: bool, command: str = "") -> str:
-        """The page of the finished sections: conclusion, terms, sections with figures, then the tables of all rows.
+        """The page of the finished sections: pictures, the table of all rows, sections with figures, terms, about.
 
         command  the line that made the page, printed on it
         """
-        rows = [row for section in sections for row in section.rows]
-        published = [row for row in rows if row.basis == "paper"]
-        others = [row for row in rows if row.basis != "paper"]
-        blocks = [words(self.about)]
+        figures = [block for section in sections for block in (heading(section.title), *section.parts)]
+        blocks = []
         missing = len(self.sections) - len(sections)
         if missing:
             blocks.append(words(f"Not finished: {missing} section{'s follow' if missing > 1 else ' follows'}.", True))
         if quick:
             blocks.append(words(f"A quick run: {self.quick}", True))
-        first = [row for item in self.main for row in rows if row.item == item]
-        if first:
-            blocks += [heading("Main results"), listed([f"{_verdict(row)}: {_in_words(row)}" for row in first])]
-        blocks += _conclusion(published, others)
+        rows = [row for section in sections for row in section.rows]
+        blocks += [*strip(figures), *_conclusion(rows, self.main), *figures]
         if self.terms:
             blocks += [heading("Terms"), terms(self.terms)]
-        for section in sections:
-            blocks += [heading(section.title), *section.parts]
-        caption = "All published values and statements."
-        blocks += [heading("Published and measured"), _table("published", published, caption)]
-        if others:
-            meanings = "; ".join(f"{basis}: {BASES[basis]}" for basis in BASES if basis != "paper")
-            caption = f"Values that the paper does not print. {meanings[0].upper()}{meanings[1:]}."
-            blocks += [heading("Expected and measured"), _table("expected", others, caption)]
-        blocks.append(words(f"Measured in {sum(s.seconds for s in sections):.0f} s.", True))
+        blocks += [heading("About this page"), words(self.about)]
+        blocks.append(words(f"Measured in {duration(sum(s.seconds for s in sections))}.", True))
         return page(self.title, blocks, command)
 
 
-def _conclusion(published: list[Row], others: list[Row]) -> list[Block]:
-    """Numbers of rows that agree: those of the paper, and those whose values it does not print."""
-    different = [row for row in published if not row.holds]
-    blocks = [
+def _conclusion(rows: Sequence[Row], main: Sequence[str]) -> list[Block]:
+    """Numbers of rows that agree, and the table of all rows; main: items of the rows that come first."""
+    published, others = ([row for row in rows if (row.basis == "paper") == printed] for printed in (True, False))
+    of_cause = {meaning: [row for row in published if not row.holds and row.cause == c] for c, meaning in CAUSES}
+    counts = ", ".join(f"{len(of)} {meaning.split(':')[0].lower()}" for meaning, of in of_cause.items() if of)
+    n_right = sum(row.holds for row in published)
+    ordered: list[Row] = []
+    heads = {}
+    groups = [
+        ("Main results", [row for item in main for row in rows if row.item == item]),
+        *((f"{meaning} ({len(of)}).", of) for meaning, of in of_cause.items()),
+        ("Published values and statements that agree.", [row for row in published if row.holds]),
+        (_meaning(others), sorted(others, key=lambda row: row.holds)),
+    ]
+    for head, members in groups:
+        rest = [row for row in members if all(row is not earlier for earlier in ordered)]
+        if rest:
+            heads[len(ordered)] = head + (" Main results among them stand above." if len(rest) < len(members) else "")
+            ordered += rest
+    return [
         heading("Conclusion"),
         words(
-            f"{len(published) - len(different)} of {len(published)} published values and statements agree with what "
-            f"was measured in this run. {len(different)} differ{':' if different else '.'}"
+            f"{n_right} of {len(published)} published values and statements agree with what was measured in this run. "
+            f"{len(published) - n_right} differ{f': {counts}' if counts else ''}."
+        ),
+        table(
+            ["item", "published or expected" if others else "published", "measured", "verdict", "why"],
+            [_cells(row) for row in ordered],
+            text=True,
+            marked=[i for i, row in enumerate(ordered) if not row.holds],
+            groups=heads,
         ),
     ]
-    for cause, meaning in CAUSES:
-        of_cause = [row for row in different if row.cause == cause]
-        if of_cause:
-            blocks += [words(f"{meaning} ({len(of_cause)})."), listed([_in_words(row) for row in of_cause])]
-    if others:
-        wrong = [row for row in others if not row.holds]
-        n_right = len(others) - len(wrong)
-        text = (
-            f"{n_right} of {len(others)} further values, which the paper does not print, agree with geometry or theory"
-        )
-        blocks.append(words(f"{text}{':' if wrong else '.'}"))
-        blocks += [listed([_in_words(row) for row in wrong])] if wrong else []
-    return blocks
 
 
-def _table(head: str, rows: list[Row], caption: str) -> Block:
-    """Rows with their criteria and verdicts; head of the second column: `published` or `expected`."""
-    return table(
-        ["item", head, "measured", "accepted if", "verdict"],
-        [_cells(row) for row in rows],
-        f"{caption} The third column was measured in this run; the fourth is the criterion behind the verdict: ok, or "
-        "differs with its cause.",
-        text=True,
-        marked=[i for i, row in enumerate(rows) if not row.holds],
+def _meaning(others: Sequence[Row]) -> str:
+    """Number of values that agree though the paper does not print them, and what they come from."""
+    meanings = "; ".join(f"{basis}: {BASES[basis]}" for basis in BASES if basis != "paper")
+    n_right = sum(row.holds for row in others)
+    return (
+        f"{n_right} of {len(others)} further values, which the paper does not print, agree with geometry or theory: "
+        f"{meanings}."
     )
 
 
@@ -316,16 +314,10 @@ def _source(row: Row) -> str:
     return row.source if row.basis == "paper" else ", ".join(filter(None, (row.basis, row.source)))
 
 
-def _in_words(row: Row) -> str:
-    """A row as a paragraph."""
-    head = "Published" if row.basis == "paper" else "Expected"
-    text = f"{row.item} ({_source(row)}). {head}: {row.expected}. Measured: {row.measured}."
-    return f"{text} {row.why[:1].upper()}{row.why[1:]}.".replace("..", ".") if row.why else text
-
-
-def _cells(row: Row) -> list[str]:
-    verdict = _verdict(row) + (f": {row.why}" if row.why else "")
-    return [row.item, f"{row.expected} ({_source(row)})", row.measured, row.rule, verdict]
+def _cells(row: Row) -> list[object]:
+    """Cells of the table: each with its source or its criterion in small print."""
+    criterion = f"(criterion: {row.rule})" if row.rule else ""
+    return [row.item, (row.expected, f"({_source(row)})"), row.measured, (_verdict(row), criterion), row.why]
 
 
 def plain(value: object) -> Any:  # what JSON takes

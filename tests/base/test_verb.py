@@ -5,11 +5,12 @@ from __future__ import annotations
 import inspect
 import pickle
 import pydoc
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import pytest
 
+from sarcl.base import text
 from sarcl.base import verb as verbs
 from sarcl.base.forecast import Forecast, Plan
 from sarcl.base.options import Options, described, option
@@ -137,6 +138,28 @@ def test_a_forecast_says_what_it_is_about():
     assert str(rows) == (
         "direct: 5 rows of 7 samples, about 2 s, 3 GB, error below 2.0e-04 (next cheaper plan: 1.0e-03 in 0.5 s)"
     )
+
+
+def test_a_forecast_says_times_that_a_person_can_plan_with_and_numbers_of_four_digits():
+    plan = {"taps": 4, "run_seconds": 12013.4, "contributions": 123456789.123, "grid": "3 x 4"}
+    long = Forecast("full wave", plan, 12013.4, 3e9, 2e-4, str, search_cheaper=lambda: pytest.fail("it planned again"))
+    assert repr(long) == "<Forecast full wave: about 3 h 20 min, 3 GB, error below 2.0e-04>"
+    html = replace(long, search_cheaper=lambda: (1e-3, 5000.0))._repr_html_()
+    assert "about 3 h 20 min" in html and "1.0e-03 in 83 min" in html
+    assert "taps 4, run_seconds 3 h 20 min, contributions 1.235e+08, grid 3 x 4" in html
+
+
+@pytest.mark.parametrize(
+    "seconds, said",
+    [
+        (0, "0 s"), (1.2e-5, "0.012 ms"), (0.0248, "25 ms"), (0.25, "0.25 s"), (2.46, "2.5 s"), (9.96, "10 s"),
+        (57.4, "57 s"), (119, "119 s"), (121, "2 min"), (3599, "60 min"), (7169, "119 min"), (7171, "2 h"),
+        (12013.4, "3 h 20 min"), (35_900, "10 h"), (79_000, "22 h"), (2 * 86400, "2 days"), (1e6, "12 days"),
+        (1e8, "1157 days"),
+    ],
+)  # fmt: skip
+def test_durations_are_said_in_the_unit_that_a_person_counts_them_in(seconds, said):
+    assert text.duration(seconds) == said
 
 
 def test_the_clock_of_a_run_begins_with_the_seconds_of_planning_and_leaves_these_alone():

@@ -80,18 +80,21 @@ def test_the_page_says_what_was_gained_and_what_was_not(measured):
     assert "is displaced by" in said and "Two points are resolved at 0.3 m, the largest separation tried" in said
     # the mapped point's side lobes meet between the two
     assert "At 0.3 m there is a dip of 13.0 dB, but another peak reaches -2.4 dB of the lower of the two: 4 " in said
-    assert len(tree.findall(".//figure")) == 4 and len(tree.findall(".//table")) == 3
+    assert len(tree.findall(".//figure")) == 4 and len(tree.findall(".//table")) == 4
     assert len(tree.find(".//table/tbody")) == len(found["mapped"])
     assert f"Made by sarcl {sarcl.__version__}: sarcl fda a & b.toml" in said
 
 
-def test_the_conclusion_stands_on_top_then_terms_then_plots_then_tables(measured):
+def test_pictures_and_the_table_of_all_cases_stand_on_top_and_the_terms_at_the_end(measured):
     tree = parsed(fda_page.html([measured[1]]))
     order = [node.tag if node.tag in ("figure", "table") else node.text for node in tree.iter()
              if node.tag in ("h2", "dl", "figure", "table")]  # fmt: skip
-    assert order == ["Conclusion", "Terms", None, "quick", *["figure"] * 4, *["table"] * 3]
-    first = tree.find(".//li").text
-    assert first == "No mapping resolves two points closer together than the conventional antenna does."
+    cases = ["quick", *["figure"] * 4, *["table"] * 3]
+    assert order == ["Conclusion", "table", *cases, "Mappings in words", "Terms", None, "About this page"]
+    conclusion_node = tree.findall(".//p")[1]
+    assert conclusion_node.text == "No mapping resolves two points closer together than the conventional antenna does."
+    links = [link.attrib["href"] for link in tree.findall(".//div[@class='strip']/a")]
+    assert links == [f"#{figure.attrib['id']}" for figure in tree.iter("figure")]
     assert tree.find(".//meta[@name='viewport']").attrib["content"] == "width=device-width, initial-scale=1"
     terms = {node.text for node in tree.findall(".//dt")}
     assert {"mapping", "null", "PSLR, ISLR", "dip", "resolved", "spatial frequencies"} <= terms
@@ -114,7 +117,7 @@ def test_points_off_the_centre_have_widths_of_their_own(measured):
     _, found = measured
     off = found["mapped"]["apparent"]["points"][1]
     tree = parsed(fda_page.html([found]))
-    rows = [[cell.text for cell in row] for row in tree.findall(".//table")[1].iter("tr")]
+    rows = [[cell.text for cell in row] for row in tree.findall(".//table")[2].iter("tr")]
     apparent = next(row for row in rows if row[0] == "apparent")
     assert rows[0][1:3] == ["y, m", "error of position, m"] and len(rows) == 1 + len(found["mapped"])
     assert apparent[1] == "0.63" and float(apparent[2]) == pytest.approx(off["error"], abs=1e-3)
@@ -343,15 +346,16 @@ def test_the_page_of_a_sweep_begins_with_its_table_and_trends(tmp_path):
     assert len(rows) == 1 + 4 * 3 and rows[2].startswith("linear|0 deg|apparent|0.13")
     assert sum("not applicable" in row for row in rows) == 2 and rows[-1].startswith("costas|60 deg|channels|")
     assert body.index("sweep of progression, squint") < body.index("case 1: progression linear")
-    # six quantities against squint, for each progression
+    # five quantities against squint, for each progression; the sixth has a value at one squint, which is no curve
     figures = [f.find("figcaption") for f in tree.findall(".//figure")]
     trends = ["".join(f.itertext()) for f in figures if "progression" in "".join(f.itertext())]
-    assert len(trends) == 12
-    assert "(apparent: none)" in [f.find("img").attrib["alt"] for f in tree.findall(".//figure")][11]
+    assert len(trends) == 10 and not any(title.startswith("resolved from") for title in trends)
+    assert {row.split("|")[1] for row in rows[1:] if row.split("|")[8] not in ("none", "")} == {"0 deg"}
+    assert "(apparent: none)" in [f.find("img").attrib["alt"] for f in tree.findall(".//figure")][9]
     said = conclusion(results)
     assert "(applies to 2 of 4 cases)" in said[1] and "Null of the first point 0.1" in said[2]
     unfinished = fda_page.html(results[:2], sections=[[], []], finished=False)
-    assert "<figure>" not in unfinished and "Not finished" in unfinished
+    assert "<figure" not in unfinished and "Not finished" in unfinished
 
 
 def test_the_command_writes_a_page_and_its_numbers(tmp_path, monkeypatch, capsys):

@@ -1,5 +1,6 @@
 """Plots and pages: positions of marks, curves that are distinguished without colour, text that is escaped."""
 
+import re
 import subprocess
 import sys
 from base64 import b64decode
@@ -55,6 +56,46 @@ def test_a_logarithmic_axis_is_ticked_at_one_two_and_five(figures):
         label.get_text() for label, at in zip(axis.get_ticklabels(), axis.get_ticklocs(), strict=True) if 1 <= at <= 100
     ]
     assert shown == ["1", "2", "5", "10", "20", "50", "100"]
+
+
+def texts_at(axis):
+    return [label.get_text().replace("\N{MINUS SIGN}", "-") for label in axis.get_ticklabels()]
+
+
+@pytest.mark.parametrize("y", [(13.9449, 13.94491), (1.39449e6, 1.394491e6), (-3e-7, 2e-7), (0.0, 0.0), (2e7, 9e7)])
+def test_ticks_have_whole_values_without_offset_or_common_power(figures, y):
+    plots.curves([("a", [0, 1], y)], "x", "y")
+    axes = figures[0].axes[0]
+    assert [axis.get_offset_text().get_text() for axis in (axes.xaxis, axes.yaxis)] == ["", ""]
+    values = axes.yaxis.get_ticklocs()
+    assert [float(text) for text in texts_at(axes.yaxis)] == pytest.approx(list(values), rel=1e-6, abs=1e-12)
+    assert len(set(texts_at(axes.yaxis))) == len(values)
+    low, high = axes.get_ylim()
+    assert high - low >= 0.999 * plots.LEAST_SPAN * max(map(abs, y)) and low <= min(y) <= max(y) <= high
+
+
+def test_one_point_is_a_marker_with_its_value_and_no_curve(figures):
+    plots.curves([("dip", [0.2], [13.94494]), ("law", [0.1, 0.3], [1, 20])], "x", "y")
+    plots.curves([("dip", [0.2], [13.94494])], "x", "y")
+    one, law = figures[0].axes[0].get_lines()
+    assert (one.get_linestyle(), law.get_linestyle()) == ("None", "--") and one.get_marker() == "o"
+    names = [[text.get_text() for text in f.axes[0].get_legend().get_texts()] for f in figures]
+    assert names == [["dip: 13.94", "law"], ["dip: 13.94"]]
+
+
+def test_compared_figures_have_the_axes_they_are_given_and_no_legend_covers_the_frame(figures):
+    values = [[0.0, 2.0], [1.0, 9.0]]
+    limits = plots.ends([[0, 4]]), plots.ends(values)
+    for y in values:
+        plots.curves([("a", [0, 4], y), ("b", [1, 3], y)], "x", "y", limits=limits)
+    plots.picture(np.eye(3), plots.PlotAxis("x", 0, 1), plots.PlotAxis("y", 0, 1), lines=[("edge", [0, 1], [0, 1])])
+    first, second, picture = (figure.axes[0] for figure in figures)
+    assert first.get_xlim() == second.get_xlim() == pytest.approx((-0.2, 4.2))
+    assert first.get_ylim() == second.get_ylim() == pytest.approx((-0.45, 9.45))
+    assert plots.ends([]) is None and plots.ends([[3.0]]) == pytest.approx((2.997, 3.003))
+    for axes in (first, picture):
+        assert axes.get_legend().get_window_extent().y0 >= axes.get_window_extent().y1 - 1
+        assert axes.get_legend().get_window_extent().y1 <= axes.figure.bbox.y1 + 1
 
 
 def test_chosen_curves_are_dots(figures):
@@ -113,6 +154,58 @@ def test_a_page_escapes_its_text_and_names_what_made_it():
     assert figure.find("figcaption").text == "caption > 0" and figure.find("img").attrib["alt"] == "y against x: a"
     kind, data = figure.find("img").attrib["src"].split(",")
     assert kind == "data:image/png;base64" and pixels(b64decode(data)).shape == (480, 672, 3)
+
+
+def test_a_strip_leads_to_one_figure_of_each_section_pictures_first():
+    picture = [html.picture([[0.0, -9.0]], (0, 1), (0, 1), "x", "y", f"P{i}. More.") for i in range(3)]
+    plot = [html.plot([("a", [0, 1], [0, 1])], "x", "y", f"C{i}.") for i in range(9)]
+    few = [html.heading("A"), plot[0], picture[0], html.heading("B"), plot[1], html.heading("C"), html.words("no")]
+    entries = html.strip(few)[0]["figures"]
+    assert [text for _, _, text in entries] == ["P0", "C0", "C1"]
+    tree = ElementTree.fromstring(html.page("T", [*html.strip(few), *few]).replace("<!doctype html>", ""))
+    links = {a.attrib["href"][1:]: a.find("img").tail for a in tree.findall(".//div[@class='strip']/a")}
+    shown = {figure.attrib["id"]: figure.find("figcaption").text for figure in tree.iter("figure")}
+    assert set(links) == set(shown) and all(shown[key].startswith(text) for key, text in links.items())
+    assert list(shown.values()) == [picture[0]["caption"], "C0.", "C1."]  # pictures before plots in a run of figures
+    assert pixels(b64decode(entries[0][1])).shape[1] == html.THUMBNAIL
+    many = [block for i in range(9) for block in (html.heading(str(i)), plot[i], *picture[i : i + 1])]
+    assert [text for _, _, text in html.strip(many)[0]["figures"]] == ["P0", "P1", "P2", "C3", "C4", "C5", "C6", "C7"]
+    same = [html.heading("A"), {**plot[0]}, html.heading("B"), {**plot[0]}]
+    assert [text for _, _, text in html.strip(same)[0]["figures"]] == ["A: C0", "B: C0"]
+    assert html.strip([html.words("no figure")]) == []
+
+
+def test_a_table_of_words_has_groups_notes_and_the_head_of_every_cell():
+    rows = [["a", ("1 m", "(table 1)")], ["b", ("2 m", "")]]
+    block = html.table(["item", "value"], rows, text=True, groups={1: "Others <&>"})
+    tree = ElementTree.fromstring(html.page("T", [block]).replace("<!doctype html>", ""))
+    assert ["".join(row.itertext()).split() for row in tree.findall(".//tbody/tr")] == [
+        ["a1", "m", "(table", "1)"], ["Others", "<&>"], ["b2", "m"],
+    ]  # fmt: skip
+    assert [cell.attrib["data-head"] for cell in tree.iter("td")] == ["item", "value"] * 2
+    assert tree.find(".//tr[@class='group']/th").attrib["colspan"] == "2" and tree.find(".//small").text == "(table 1)"
+    assert len(tree.findall(".//small")) == 1
+
+
+def test_colours_of_a_page_have_contrast_in_light_and_in_dark():
+    """Contrast of text and background as WCAG 2 defines it, 4.5 or more: luminance is that of sRGB."""
+
+    def luminance(colour):
+        digits = colour if len(colour) == 6 else "".join(2 * digit for digit in colour)
+        v = np.array([int(digits[i : i + 2], 16) / 255 for i in (0, 2, 4)])
+        return np.where(v <= 0.04045, v / 12.92, ((v + 0.055) / 1.055) ** 2.4) @ [0.2126, 0.7152, 0.0722]
+
+    palettes = [
+        {name: luminance(colour) for name, colour in re.findall(r"--(\w+): #(\w+);", line)}
+        for line in html.page("T", []).splitlines()
+        if ":root" in line
+    ]
+    assert len(palettes) == 2 and palettes[0]["paper"] > 0.9 and palettes[1]["paper"] < 0.05
+    for palette in palettes:
+        for text in ("ink", "faint", "link"):
+            for ground in ("paper", "mark", "group"):
+                bright, dark = sorted((palette[text], palette[ground]), reverse=True)
+                assert (bright + 0.05) / (dark + 0.05) >= 4.5, (text, ground)
 
 
 def test_pictures_of_the_base_install_need_no_extra_and_plots_no_pyplot():

@@ -25,16 +25,20 @@ from sarcl.papers.paper import Paper, Section, plain
 
 
 class Page:
-    """A page's words, and the number of figures under each heading of level 2. Refuses tags that do not close."""
+    """A page's words, rows of its first table without groups, and the number of figures under each heading of level 2.
+
+    Refuses tags that do not close."""
 
     def __init__(self, text):
         tree = ElementTree.fromstring(text.replace("<!doctype html>", ""))
         self.words = "".join(tree.itertext())
-        self.rows = (
-            [[cell.text for cell in row] for row in tree.findall(".//table")[-1].iter("tr")]
-            if tree.findall(".//table")
-            else []
-        )
+        rows = [row for row in tree.findall(".//table")[0].iter("tr")] if tree.findall(".//table") else []
+        self.groups = ["".join(row.itertext()) for row in rows if "group" in row.attrib.get("class", "")]
+        self.rows = [
+            ["".join(cell.itertext()).strip() for cell in row]
+            for row in rows
+            if "group" not in row.attrib.get("class", "")
+        ]
         self.sections, heading = {}, None
         for node in tree.iter():
             if node.tag == "h2":
@@ -195,13 +199,14 @@ def test_trends_hold_the_known_figures(quick):
     assert [found["pslr_db"][i] for i in at] == pytest.approx([-13.0, -11.8, -10.6], abs=0.1)
 
 
-def test_the_page_has_its_conclusion_on_top_and_its_table_at_the_end(short):
+def test_the_page_has_pictures_and_its_table_on_top_and_its_terms_at_the_end(short):
     text, document = short
     made = Page(text)
     sections = list(made.sections)
-    assert sections[:3] == ["Main results", "Conclusion", "Terms"] and sections[-1] == "Published and measured"
-    assert [s["title"] for s in document["sections"]] == sections[3:-1]
-    assert all(made.sections[title] > 0 for title in sections[3:-1])
+    assert sections[0] == "Conclusion" and sections[-2:] == ["Terms", "About this page"]
+    assert [s["title"] for s in document["sections"]] == sections[1:-2]
+    assert all(made.sections[title] > 0 for title in sections[1:-2])
+    assert text.index('class="strip"') < text.index("Conclusion") < text.index("<table") < text.index("<figure")
     rows = rows_of(document)
     agree = f"{len(rows) - len(ERR)} of {len(rows)} published values and statements agree"
     assert made.words.index("Conclusion") < made.words.index(agree) < made.words.index("Terms")
@@ -211,20 +216,24 @@ def test_the_page_has_its_conclusion_on_top_and_its_table_at_the_end(short):
     assert "sarcl papers farooq -o" in made.words and f"Made by sarcl {sarcl.__version__}" in made.words
     assert "Errors in print: a sign, a subscript or a number of the paper contradicts" in made.words
     assert made.words.index("(4).") < made.words.index("Differences of interpretation") < made.words.index("(6).")
+    assert "10 differ: 4 errors in print, 6 differences of interpretation." in made.words
+    main = [row[0] for row in made.rows[1:]][: len([item for item in PAPER.main if item in rows])]
+    assert made.groups[0] == "Main results" and main == [item for item in PAPER.main if item in rows]
     assert "A quick run" not in made.words and document["finished"] and not document["quick"]
     assert len(text) < 4e6 and f"One file of {len(text) / 1e6:.1f} MB" in made.words
 
 
 def test_every_verdict_stands_beside_its_criterion(short):
     head, *rows = Page(short[0]).rows
-    assert head == ["item", "published", "measured", "accepted if", "verdict"]
+    assert head == ["item", "published", "measured", "verdict", "why"]
     found = rows_of(short[1])
-    assert len(rows) == len(found) and all(row[3] for row in rows)
-    for item, _, measured, _, verdict in rows:
+    assert sorted(row[0] for row in rows) == sorted(found) and all("(criterion: " in row[3] for row in rows)
+    for item, _, measured, verdict, why in rows:
         cause = found[item]["cause"]
-        assert verdict.startswith("ok" if found[item]["holds"] else f"differs ({cause}): ")
+        assert verdict.startswith("ok (" if found[item]["holds"] else f"differs ({cause}) (criterion: ")
         assert bool(cause) != found[item]["holds"] and measured == found[item]["measured"]
-    assert next(row[3] for row in rows if row[0] == "period") == "within 0.001 ns"
+        assert why == found[item]["why"] and bool(why) >= bool(cause)
+    assert next(row[3] for row in rows if row[0] == "period") == "ok (criterion: within 0.001 ns)"
     assert not any("rule" in row for row in found.values())
 
 
@@ -258,9 +267,13 @@ def test_values_that_the_paper_does_not_print_are_marked_and_not_counted_as_publ
     assert "1 of 1 published values and statements agree" in page.words
     assert "1 of 2 further values, which the paper does not print, agree with geometry or theory:" in page.words
     head, *rows = page.rows
-    assert head[:2] == ["item", "expected"] and [row[1] for row in rows] == [
-        "28.4 m (geometry, figure 3)", "exact (theory, Mie)",
-    ]  # fmt: skip
+    assert head[:2] == ["item", "published or expected"]
+    assert [row[1] for row in rows] == ["0.167 m (table 1)", "exact (theory, Mie)", "28.4 m (geometry, figure 3)"]
+    assert page.groups == [
+        "Published values and statements that agree.",
+        "1 of 2 further values, which the paper does not print, agree with geometry or theory: geometry: follows from "
+        "the dimensions that this page chose; theory: a law, a closed form, or the tolerance that was asked for.",
+    ]
     written = section.document()["rows"]
     assert [("published" in row, row["basis"]) for row in written] == [
         (True, "paper"), (False, "geometry"), (False, "theory"),

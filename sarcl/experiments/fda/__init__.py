@@ -12,7 +12,7 @@ For this folder alone:
 
     _array       arrays of experiments
     _sweep       every combination of swept values
-    _trends      plots and tables of sweeps
+    _trends      table of all cases, plots of sweeps
 """
 
 from ._sweep import sweep

@@ -1,17 +1,27 @@
-"""Sweeps on the page of an experiment: measured quantities plotted against the swept one, and a table of all cases."""
+"""Table of all cases on the page of an experiment, and plots of measured quantities against a swept one."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from ...figures import html
+from ...figures.plots import ends
 from ._sweep import UNITS, shown
-from .experiment import CONVENTIONAL
-from .text import conclusion, mappings_of, worst
+from .experiment import CONVENTIONAL, nearer
+from .text import conclusion, mappings_of, spoiled, worst
 
 DECADE = 20.0  # ratio of largest to smallest value from which on the axis is logarithmic
 Result = Mapping[str, Any]
+
+RANKS = {
+    1: "resolved closer together",
+    0: "resolved equally close",
+    -1: "resolved farther apart or not at all",
+    None: "resolved by neither",
+}
 
 
 def _of_first(key: str) -> Callable[[Mapping[str, Any]], float | None]:
@@ -29,7 +39,7 @@ QUANTITIES: tuple[tuple[str, str, Callable[[Mapping[str, Any]], float | None]], 
 
 
 def summary(results: Sequence[Result], plots: bool = True) -> list[html.Block]:
-    """Blocks of every series that was swept: heading, conclusion, plots (unless left out) and table."""
+    """Blocks of every series that was swept: heading, plots (unless left out), and its conclusion in words."""
     blocks: list[html.Block] = []
     series: dict[tuple[str, tuple[str, ...]], list[Result]] = {}
     for result in results:
@@ -37,13 +47,12 @@ def summary(results: Sequence[Result], plots: bool = True) -> list[html.Block]:
             series.setdefault((result["series"], tuple(result["swept"])), []).append(result)
     for (name, keys), cases in series.items():
         blocks.append(html.heading(f"{name}: sweep of {', '.join(keys)}"))
-        if len(cases) < len(results):  # else the conclusion of the page says it
-            blocks.append(html.listed(conclusion(cases)))
         drawn = _plots(cases) if plots else []
         if drawn:
             note = "The first point of each case. A marker is missing where there is no value."
             blocks += [html.words(note, True), *drawn]
-        blocks.append(_table(cases))
+        if len(cases) < len(results):  # else the conclusion of the page says it
+            blocks.append(html.listed(conclusion(cases)))
     return blocks
 
 
@@ -51,22 +60,34 @@ def _names(cases: Sequence[Result]) -> list[str]:
     return [CONVENTIONAL, *mappings_of(cases)]
 
 
-def _table(cases: Sequence[Result]) -> html.Block:
-    rows = []
-    for case in cases:
-        values = [shown(key, value) for key, value in case["swept"].items()]
-        for name in _names(cases):
+def table(results: Sequence[Result]) -> html.Block:
+    """Every case and mapping: values of the first point, and whether two points are resolved closer together."""
+    series = {(result["series"], *result["swept"]) for result in results}
+    keys = [*results[0]["swept"]] if len(series) == 1 else []
+    rows: list[list[str]] = []
+    marked = []
+    for case in results:
+        plain = case["mapped"][CONVENTIONAL]
+        which = [shown(key, case["swept"][key]) for key in keys] or [case["name"]]
+        for name in _names(results):
             if name in case["mapped"]:
-                row_of = [(form, value(case["mapped"][name])) for _, form, value in QUANTITIES]
-                rows.append([*values, name, *("none" if v is None else form.format(v) for form, v in row_of)])
+                row = case["mapped"][name]
+                values = [(form, value(row)) for _, form, value in QUANTITIES]
+                rank = nearer(row, plain, case["null"])
+                verdict = "reference" if name == CONVENTIONAL else RANKS[rank]
+                if name != CONVENTIONAL and rank == -1:
+                    marked.append(len(rows))
+                texts = ["none" if v is None else form.format(v) for form, v in values]
+                rows.append([*which, name, *texts, verdict, spoiled(row, case["null"])])
             elif name in case["not_applicable"]:
-                rows.append([*values, name, "not applicable", *[""] * (len(QUANTITIES) - 1)])
-    head = [*cases[0]["swept"], "mapping", *(title for title, _, _ in QUANTITIES)]
+                reason = case["not_applicable"][name]
+                rows.append([*which, name, *[""] * len(QUANTITIES), "not applicable", f"{reason}."])
+    head = [*(keys or ["case"]), "mapping", *(title for title, _, _ in QUANTITIES), "two points", "why"]
     caption = (
-        "All cases of the sweep: the first point, focused alone; the largest error of position of any point; the "
-        "smallest separation from which on two points are resolved."
+        "The first point, focused alone; the largest error of position of any point; the smallest separation from "
+        "which on two points are resolved, and whether the conventional antenna needs a larger one."
     )
-    return html.table(head, rows, caption)
+    return html.table(head, rows, caption, text=True, marked=marked)
 
 
 def _plots(cases: Sequence[Result]) -> list[html.Block]:
@@ -86,16 +107,24 @@ def _plots(cases: Sequence[Result]) -> list[html.Block]:
         others.setdefault(rest, []).append(case)
     out = []
     for rest, group in others.items():
-        for title, _, value in QUANTITIES:
+        for title, form, value in QUANTITIES:
+            known = [
+                float(form.format(v))
+                for case in cases
+                for row in case["mapped"].values()
+                if (v := value(row)) is not None
+            ]
+            limits = None if many else ends([scale * np.array(values)]), ends([known])
             curves = []
             for name in _names(group):
                 pairs = sorted(
-                    (scale * case["swept"][key], v)
+                    (scale * case["swept"][key], float(form.format(v)))  # to the digits of the table
                     for case in group
                     if name in case["mapped"] and (v := value(case["mapped"][name])) is not None
                 )
                 x, y = zip(*pairs, strict=True) if pairs else ((), ())
                 curves.append((name if pairs else f"({name}: none)", x, y))
-            if any(len(x) for _, x, _ in curves):
-                out.append(html.plot(curves, axis, title, f"{title}{'; ' if rest else ''}{rest}", log_x=many))
+            if any(len(x) > 1 for _, x, _ in curves):
+                text = f"{title}{'; ' if rest else ''}{rest}"
+                out.append(html.plot(curves, axis, title, text, log_x=many, limits=limits))
     return out

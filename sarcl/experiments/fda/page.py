@@ -1,4 +1,4 @@
-"""The page of an experiment on frequency-diverse apertures: conclusion, terms, plots, tables."""
+"""The page of an experiment on frequency-diverse apertures: pictures, table of all cases, plots, tables, terms."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 from pkgutil import get_data
 from typing import Any
 
-from ...figures.html import Block, heading, page, plot, table, terms, words
+from ...figures.html import Block, heading, page, plot, strip, table, terms, words
 from ...figures.html import listed as bullets
+from ...figures.plots import ends
 from . import _trends
 from .experiment import CONVENTIONAL, RESOLVED
 from .text import conclusion, decibels, rule, setting, verdicts
@@ -37,26 +38,27 @@ def html(
     sections  `section` of each result, where they were made before; None: made here
     finished  whether all cases are there; until then the plots of sweeps are left out
     """
-    blocks = [
+    sections = [*map(section, results)] if sections is None else sections
+    trends, cases = _trends.summary(results, finished), [block for blocks in sections for block in blocks]
+    first, *for_mappings = conclusion(results)
+    blocks = [] if finished else [words("Not finished: more cases follow.", True)]
+    blocks += strip(trends) or strip(cases)
+    blocks += [heading("Conclusion"), words(first), _trends.table(results), *trends, *cases]
+    if for_mappings:
+        blocks += [heading("Mappings in words"), bullets(for_mappings)]
+    blocks += [heading("Terms"), terms([(term, text.format(rule=rule())) for term, text in _terms().items()])]
+    blocks += [
+        heading("About this page"),
         words(
             "Every case is an array and a track. Its echoes are collected once, mapped and focused in several ways, "
-            "and compared with a conventional antenna. The terms are explained after the conclusion."
+            "and compared with a conventional antenna."
         ),
-        heading("Conclusion"),
-        bullets(conclusion(results)),
-        heading("Terms"),
-        terms([(term, text.format(rule=rule())) for term, text in _terms().items()]),
     ]
-    if not finished:
-        blocks.insert(1, words("Not finished: more cases follow.", True))
-    blocks += _trends.summary(results, finished)
-    for blocks_of_cases in sections or map(section, results):
-        blocks += blocks_of_cases
     return page(title, blocks, command)
 
 
 def section(result: Result, level: int = 2) -> list[Block]:
-    """One case: what was flown, what each mapping gained, plots, tables; level: of its heading."""
+    """One case: array and track, plots, tables, and what each mapping gained in words; level: of its heading."""
     rows = result["mapped"]
     points = [p["place"] for p in rows[CONVENTIONAL]["points"]]
     separations = [d["separation"] for d in rows[CONVENTIONAL]["dips"]]
@@ -64,17 +66,15 @@ def section(result: Result, level: int = 2) -> list[Block]:
     blocks = [
         heading(result["name"], level),
         words(setting(result)),
-        bullets(verdicts(result)),
-        plot(dips, "separation, m", "dip, dB", _caption_of_dips(rows)),
+        *([plot(dips, "separation, m", "dip, dB", _caption_of_dips(rows))] if len(separations) > 1 else []),
         *_supports(result),
         table(
-            ["mapping", "aperture, m", "gap, m", "spread of spatial frequencies, cycles/m", *WIDTHS],
+            ["mapping", "aperture, m", "gap, m", "spread of spatial frequencies, cycles/m"],
             [
-                [name, f"{row['length']:.1f}", f"{row['gap']:.1f}", f"{row['claimed']:.3f}", *_widths(row["points"][0])]
+                [name, f"{row['length']:.1f}", f"{row['gap']:.1f}", f"{row['claimed']:.3f}"]
                 for name, row in rows.items()
             ],
-            f"A point at y = {points[0]:g} m, focused alone. Aperture and gap: length of the track from which the "
-            "echoes are focused, and the largest gap in it.",
+            "Aperture and gap: length of the track from which the echoes are focused, and the largest gap in it.",
         ),
     ]
     if len(points) > 1:
@@ -91,8 +91,7 @@ def section(result: Result, level: int = 2) -> list[Block]:
         "the dip alone would resolve them, the number of peaks, or their largest error of position, or their level. "
         f"Resolved here: {rule(result['null'])}."
     )
-    blocks.append(table(head, cells, caption))
-    return blocks
+    return [*blocks, table(head, cells, caption), bullets(verdicts(result))]
 
 
 def _caption_of_dips(rows: Mapping[str, Any]) -> str:
@@ -114,12 +113,20 @@ def _supports(result: Result) -> list[Block]:
     ]
     if "apparent" in rows:
         clouds.append(("apparent", rows["apparent"], "Spatial frequencies implied by the apparent positions"))
-    out = []
-    for name, row, caption in clouds:
-        along, across = zip(*row["support"], strict=True)
-        text = f"{caption}: spread of {row['claimed']:.3f} cycles/m across."
-        out.append(plot([(name, across, along)], "across, cycles/m", "along, cycles/m", text, dots=True))
-    return out
+    supports = [zip(*row["support"], strict=True) for _, row, _ in clouds]
+    along, across = zip(*supports, strict=True)
+    limits = ends(across), ends(along)
+    return [
+        plot(
+            [(name, across[i], along[i])],
+            "across, cycles/m",
+            "along, cycles/m",
+            f"{caption}: spread of {row['claimed']:.3f} cycles/m across.",
+            dots=True,
+            limits=limits,
+        )
+        for i, (name, row, caption) in enumerate(clouds)
+    ]
 
 
 WIDTHS = ("null, m", "half power, m", "PSLR, dB", "ISLR, dB")

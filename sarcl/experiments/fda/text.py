@@ -201,7 +201,8 @@ def _verdict(row: Mapping[str, Any], plain: Mapping[str, Any], null: float) -> s
         text += f" No point is displaced along its cut by more than {at_most(worst_point['error'])} m."
     alike = nearer(row, plain, null) == 0 and row["told_apart"] != plain["told_apart"]
     same = ", with dips that differ by less than 0.2 dB" if alike else ""
-    return f"{text} Two points are resolved {_apart(row)} (conventional: {_apart(plain)}{same}).{_spoiled(row, null)}"
+    text = f"{text} Two points are resolved {_apart(row)} (conventional: {_apart(plain)}{same})."
+    return f"{text} {spoiled(row, null)}".rstrip()
 
 
 def decibels(value: float) -> str:
@@ -224,8 +225,8 @@ def _apart(row: Mapping[str, Any]) -> str:
     return f"at all separations tried from {least:g} m to {largest:g} m"
 
 
-def _spoiled(row: Mapping[str, Any], null: float) -> str:
-    """Reasons why a dip of enough decibels does not resolve two points: all, of the first such dip."""
+def spoiled(row: Mapping[str, Any], null: float) -> str:
+    """Reasons why a dip of enough decibels does not resolve two points: all, of the first such dip; "" for none."""
     for dip in row["dips"]:
         counted = row["told_apart"] is not None and dip["separation"] >= row["told_apart"]
         if dip["dip_db"] < RESOLVED or counted:
@@ -233,5 +234,5 @@ def _spoiled(row: Mapping[str, Any], null: float) -> str:
         why = ["the points are not resolved at a larger separation"]
         if not is_resolved(dip, null):
             why = unresolved(dip, null)
-        return f" At {dip['separation']:g} m there is a dip of {dip['dip_db']:.1f} dB, but {'; '.join(why)}."
+        return f"At {dip['separation']:g} m there is a dip of {dip['dip_db']:.1f} dB, but {'; '.join(why)}."
     return ""
