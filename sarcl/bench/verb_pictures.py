@@ -25,31 +25,38 @@ def picture(cases: list[ratios.Result]) -> bytes:
             )
     if not lines:
         raise ValueError("no case has a row that ran; there is nothing to draw")
+    sizes = [case["n"] for case in cases]
     figure = plots.figure(SIZE)
     figure.set_layout_engine("constrained")
-    error, size = figure.subplots(1, 2, sharey=True)
-    sizes = [case["n"] for case in cases]
+    error, *of_size = figure.subplots(1, min(len(sizes), 2), sharey=True, squeeze=False)[0]  # one size is no curve
+    marks = dict(zip(dict.fromkeys(tolerance for _, tolerance in lines), itertools.cycle(MARKS), strict=False))
     for i, label in enumerate(dict.fromkeys(label for label, _ in lines)):
         look = plots.style(i)
         own = {tolerance: rows for (name, tolerance), rows in lines.items() if name == label}
-        for n in sizes:
+        for k, n in enumerate(sizes):
             rows = [row for group in own.values() for row in group if row["n"] == n]
-            error.plot([row["error"] for row in rows], [row["cpu"] for row in rows], **look)
+            error.plot([row["error"] for row in rows], [row["cpu"] for row in rows], **look | {"marker": ""})
             for row in rows[:1]:  # the largest tolerance
-                error.annotate(f"n = {n}", (row["error"], row["cpu"]), (6, 4), textcoords="offset points", fontsize=8)
-        for mark, (tolerance, rows) in zip(itertools.cycle(MARKS), own.items(), strict=False):
-            name = f"{label} at {tolerance.replace('e-0', 'e-')}"
-            size.plot([row["n"] for row in rows], [row["cpu"] for row in rows], label=name, **look | {"marker": mark})
-    for axes in (error, size):
+                place, shift = (row["error"], row["cpu"]), (6, 4 - 14 * (k % 2))
+                error.annotate(f"n = {n}", place, shift, textcoords="offset points", fontsize=8)
+        for tolerance, rows in own.items():
+            look["marker"] = marks[tolerance]
+            name, cpu = f"{label} at {tolerance.replace('e-0', 'e-')}", [row["cpu"] for row in rows]
+            error.plot([row["error"] for row in rows], cpu, label=name, **look | {"linestyle": "none"})
+            for axes in of_size:
+                axes.plot([row["n"] for row in rows], cpu, label=name, **look)
+    for axes in (error, *of_size):
         axes.set_xscale("log")
         axes.set_yscale("log")
         axes.margins(0.12, 0.1)
     plots.decades(error.yaxis)
     plots.decades(error.xaxis)
     plots.names(error, "relative error against the exact result", "CPU seconds")
-    plots.names(size, "size n", "")
-    size.set_xticks(sizes, [str(n) for n in sizes])
-    size.minorticks_off()
+    for axes in of_size:
+        plots.names(axes, "size n", "")
+        axes.set_xticks(sizes, [str(n) for n in sizes])
+        axes.minorticks_off()
     error.set_title(f"{cases[0]['scene']}: down and left is better", loc="left")
-    size.legend(fontsize=8, frameon=False, loc="upper left", bbox_to_anchor=(1.01, 1.0))
+    (*_, last) = error, *of_size
+    last.legend(fontsize=8, frameon=False, loc="upper left", bbox_to_anchor=(1.01, 1.0))
     return plots.png(figure, 128)

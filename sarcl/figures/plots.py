@@ -141,7 +141,7 @@ def ends(values: Sequence[ArrayLike]) -> tuple[float, float] | None:
     if not every.size:
         return None
     low, high = float(every.min()), float(every.max())
-    margin = MARGIN * (high - low) or LEAST_SPAN * abs(high) or 1.0
+    margin = MARGIN * (high - low) or LEAST_SPAN * (abs(high) or 1.0)
     return low - margin, high + margin
 
 
@@ -176,7 +176,9 @@ def plain_numbers(axis: Axis) -> None:
 
     def text(value: float, _: int | None) -> str:
         places = axis.get_majorticklocs()
-        return number(value, float(places[1] - places[0]) if len(places) > 1 else 1.0).replace("-", "\N{MINUS SIGN}")
+        step = float(places[1] - places[0]) if len(places) > 1 else 1.0
+        decimals = next(d for d in range(18) if abs(round(step, d) - step) <= 1e-6 * step or d == 17)
+        return number(value, max(10.0**-decimals, step * (decimals == 0))).replace("-", "\N{MINUS SIGN}")
 
     axis.set_major_formatter(FuncFormatter(text))
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...base.text import duration
 from ..paper import Section
 from ._lab import TOLERANCE, Lab, report_of
 
@@ -48,15 +49,8 @@ def section(lab: Lab) -> Section:
         curves_db = [(label, degrees, _db(error)) for label, error in curves]
         out.plot("Error of waveform forming at each azimuth", curves_db)
         own_seconds = sum(report.seconds.values())
-        times.append(
-            [
-                name,
-                f"{errors.seconds[0] * n:.0f}",
-                f"{errors.seconds[1]:.1f}",
-                f"{own_seconds:.0f}",
-                f"{errors.seconds[0] * n / own_seconds:.0f}",
-            ]
-        )
+        seconds = errors.seconds[0] * n, errors.seconds[1], own_seconds
+        times.append([name, *map(duration, seconds), f"{seconds[0] / own_seconds:.0f}"])
         out.keep(**{name: {
             "azimuth_deg": degrees, "one_anchor": errors.one, "own_anchors": errors.own, "totals": errors.totals,
             "seconds_per_azimuth": errors.seconds[0], "seconds_one_anchor": errors.seconds[1], "anchors": anchors,

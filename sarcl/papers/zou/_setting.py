@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...analysis.point_response import PointResponse, measure
+from ...base.text import duration
 from ...imaging.backproject import backproject
 from ...scene.scene import Scene
 from ...simulation.echo import echo
@@ -84,7 +85,7 @@ def _table(out: Section, lab: Lab) -> None:
         plan: dict[str, Any] = dict(needs.plan)
         full.append([
             target.name, plan["grid"], plan["steps"], f"{plan['run_bytes'] / 2**30:.1f}", plan["runs"],
-            f"{plan['run_seconds'] / 60:.0f}", f"{needs.seconds / 3600:.1f}",
+            duration(plan["run_seconds"]), duration(needs.seconds),
         ])  # fmt: skip
         out.keep(**{target.name: {"run_bytes": plan["run_bytes"], "runs": plan["runs"], "seconds": needs.seconds}})
     out.table("Targets of table 2", sizes, text=True)
