@@ -10,6 +10,7 @@ import report as page
 from sarcl import verbs as all_verbs
 from sarcl.bench import tables, verb_pictures, verbs
 from sarcl.cli import parser
+from sarcl.figures import plots
 
 SIZES = {
     "channels of an array": 9, "spectral echo": 512, "range-Doppler": 256, "full wave": 16, "beam of an array": 8,
@@ -74,6 +75,35 @@ def test_a_document_of_verbs_has_rows_with_errors_and_both_kinds_of_seconds():
 def test_bad_input_is_found_before_the_work(options, said):
     with pytest.raises(ValueError, match=said):
         verbs.run(**options)
+
+
+def test_a_tolerance_has_one_marker_and_one_size_has_no_panel_of_sizes(monkeypatch):
+    drawn = []
+    monkeypatch.setattr(plots, "png", lambda figure, *_: drawn.append(figure))
+
+    def case(n):
+        rows = [
+            {
+                "who": "sarcl",
+                "device": "d",
+                "method": "direct",
+                "setting": setting,
+                "error": error,
+                "seconds": {"form": [1.0], "cpu": [n]},
+            }
+            for setting, error in (("1e-01", 0.05), ("1e-03", 5e-4))
+        ]
+        return {"scene": "task", "words": "a task", "n": n, "rows": rows}
+
+    verb_pictures.picture([case(8)])
+    verb_pictures.picture([case(8), case(16)])
+    assert [len(figure.axes) for figure in drawn] == [1, 2]
+    for figure in drawn:
+        marks = [{line.get_label(): line.get_marker() for line in axes.get_lines()} for axes in figure.axes]
+        named = [{name: mark for name, mark in panel.items() if name[0] != "_"} for panel in marks]
+        assert all(panel == {"direct, d at 1e-1": "o", "direct, d at 1e-3": "s"} for panel in named)
+        legends = [axes.get_legend() is not None for axes in figure.axes]
+        assert legends == [False] * (len(legends) - 1) + [True]
 
 
 def test_the_command_writes_a_picture_for_each_verb_and_the_page_is_made_from_its_file(tmp_path, capsys):

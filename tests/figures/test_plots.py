@@ -62,7 +62,9 @@ def texts_at(axis):
     return [label.get_text().replace("\N{MINUS SIGN}", "-") for label in axis.get_ticklabels()]
 
 
-@pytest.mark.parametrize("y", [(13.9449, 13.94491), (1.39449e6, 1.394491e6), (-3e-7, 2e-7), (0.0, 0.0), (2e7, 9e7), (0.12, 0.33)])
+@pytest.mark.parametrize(
+    "y", [(13.9449, 13.94491), (1.39449e6, 1.394491e6), (-3e-7, 2e-7), (0.0, 0.0), (2e7, 9e7), (0.12, 0.33)]
+)
 def test_ticks_have_whole_values_without_offset_or_common_power(figures, y):
     plots.curves([("a", [0, 1], y)], "x", "y")
     axes = figures[0].axes[0]
