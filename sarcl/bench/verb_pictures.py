@@ -28,7 +28,8 @@ def picture(cases: list[ratios.Result]) -> bytes:
     sizes = [case["n"] for case in cases]
     figure = plots.figure(SIZE)
     figure.set_layout_engine("constrained")
-    error, *of_size = figure.subplots(1, min(len(sizes), 2), sharey=True, squeeze=False)[0]  # one size is no curve
+    panels = figure.subplots(1, min(len(sizes), 2), sharey=True, squeeze=False)[0]  # one size is no curve
+    error, of_size = panels[0], panels[1:]
     marks = dict(zip(dict.fromkeys(tolerance for _, tolerance in lines), itertools.cycle(MARKS), strict=False))
     for i, label in enumerate(dict.fromkeys(label for label, _ in lines)):
         look = plots.style(i)
@@ -45,7 +46,7 @@ def picture(cases: list[ratios.Result]) -> bytes:
             error.plot([row["error"] for row in rows], cpu, label=name, **look | {"linestyle": "none"})
             for axes in of_size:
                 axes.plot([row["n"] for row in rows], cpu, label=name, **look)
-    for axes in (error, *of_size):
+    for axes in panels:
         axes.set_xscale("log")
         axes.set_yscale("log")
         axes.margins(0.12, 0.1)
@@ -57,6 +58,5 @@ def picture(cases: list[ratios.Result]) -> bytes:
         axes.set_xticks(sizes, [str(n) for n in sizes])
         axes.minorticks_off()
     error.set_title(f"{cases[0]['scene']}: down and left is better", loc="left")
-    (*_, last) = error, *of_size
-    last.legend(fontsize=8, frameon=False, loc="upper left", bbox_to_anchor=(1.01, 1.0))
+    panels[-1].legend(fontsize=8, frameon=False, loc="upper left", bbox_to_anchor=(1.01, 1.0))
     return plots.png(figure, 128)
