@@ -243,44 +243,23 @@ END
 
 # ---------------------------------------------------------------- an OpenCL device
 
-# Keeps in `devices` what `sarcl devices` says; true when one works.
+# True when a device works; else `sarcl doctor` says what is wrong and how to mend it, crashes of drivers included.
 have_device() {
     status=0
-    devices=$($inside -m sarcl devices 2>&1) || status=$?
+    words=$(SARCL_DEVICE= $inside -m sarcl doctor 2>&1) || status=$?
     [ $status = 0 ] && return
-    if [ $status = 3 ]; then # the table; its own last line says what we are about to say
-        printf '%s\n' "$devices" | grep -v '^sarcl: ' >&2 || true
-        return 1
-    fi
-    printf '%s\n' "$devices" >&2
-    if [ $status -ge 128 ]; then
-        stop 1 <<END
-an OpenCL driver crashed while we looked for devices (status $status, its words are above).
-In a chroot or container PoCL needs /sys and /proc: mount them. A broken driver is passed over by
-pointing OCL_ICD_VENDORS at a folder with only the .icd files that work; see docs/guide/install.md.
-END
-    fi
+    printf '%s\n' "$words" >&2
+    [ $status = 3 ] && return 1
     stop 1 <<END
-'.venv/bin/python -m sarcl devices' failed (status $status, its words are above), so the package
+'.venv/bin/python -m sarcl doctor' failed (status $status, its words are above), so the package
 itself does not start. Type 'make clean' $again
 END
 }
 
 still_no_device() {
-    cache=${XDG_CACHE_HOME:-${HOME:-}/.cache}
-    if ! mkdir -p "$cache" 2>/dev/null || [ ! -w "$cache" ]; then
-        stop 3 <<END
-no OpenCL device here can build a kernel: PoCL keeps what it builds in '$cache',
-which cannot be written. Type
-
-    export XDG_CACHE_HOME=/tmp/cache-$(id -u)
-
-$again
-END
-    fi
     stop 3 <<END
-no OpenCL device here can build a kernel, although pocl-opencl-icd is installed; the table
-above says why. See docs/guide/install.md for other drivers, install one, $again
+no OpenCL device here can build a kernel, although pocl-opencl-icd is installed. The list above says
+why and what to do; docs/guide/install.md names other drivers. Do that, $again
 END
 }
 

@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from .text import size_text
+
+if TYPE_CHECKING:
+    import numpy as np
 
 
 def installed() -> float:
@@ -24,6 +26,8 @@ def zeros(shape: tuple[int, ...], limit: float, what: str) -> np.ndarray:
 
     MemoryError with the bytes that `what` needs, where the folder of temporary files has no room.
     """
+    import numpy as np
+
     nbytes = 8.0 * float(np.prod(shape, dtype=np.float64))
     if nbytes <= limit:
         return np.zeros(shape, np.complex64)

@@ -7,6 +7,7 @@ For other folders:
 For this folder alone:
 
     _commands   what each command does, and the table of devices
+    _doctor     sarcl doctor: the machine, the packages and OpenCL on one screen
     _flags      options of the verbs as the parser needs them, made from their records
     _job        output files and interruption of a command
     _methods    the methods of sarcl focus: options, plan, image

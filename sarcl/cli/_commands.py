@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..base.text import duration
 from ..io import formats, input_paths, output_paths
+from . import _doctor
 from ._job import Job, Outputs
 from ._pages import bench, fda, papers
 
@@ -35,6 +36,7 @@ def run(args: argparse.Namespace, outputs: Outputs) -> int:
     warnings.showwarning = _show_warning
     commands = {
         "devices": devices,
+        "doctor": lambda args, job: _doctor.run(args.json),
         "demo": demo,
         "simulate": simulate,
         "focus": focus,

@@ -1,4 +1,4 @@
-"""The parser of the command line: sarcl devices | demo | simulate | focus | measure | fda | papers | bench.
+"""The parser of the command line: sarcl devices | doctor | demo | simulate | focus | measure | fda | papers | bench.
 
 It imports nothing that takes time, so that --help answers at once; sarcl/cli/_commands.py does the work.
 """
@@ -88,6 +88,8 @@ def parser() -> argparse.ArgumentParser:
         )
 
     command("devices", "list the OpenCL devices: which work, which do not and why")
+    doctor = command("doctor", "say what keeps OpenCL, or a part of it, from working on this machine, and the remedy")
+    _flag(doctor, "--json", "print all that was found as JSON")
     demo = command("demo", "simulate the echoes of a scene, focus them and write the picture", device)
     _add(demo, "--out DIR", "folder for the results, made if missing (default out)", default="out")
     _flag(demo, "--quick", "half the resolution, in a few seconds")

@@ -49,13 +49,7 @@ def _writable() -> str:
     Where the user's own can be written, nothing changes. Else a folder of this user's in the folder of temporary files
     is taken, and the log warns of it.
     """
-    import platformdirs
-
-    own = os.environ.get("POCL_CACHE_DIR") or platformdirs.user_cache_dir()
-    why = _trouble(Path(own))
-    shared = platformdirs.user_cache_dir()
-    if not why and own != shared:
-        own, why = shared, _trouble(Path(shared))
+    own, why = unwritable()
     if not why:
         return ""
     try:
@@ -76,6 +70,16 @@ def _writable() -> str:
     if "POCL_CACHE_DIR" in os.environ:
         os.environ["POCL_CACHE_DIR"] = os.path.join(other, "pocl")
     return ""
+
+
+def unwritable() -> tuple[str, str]:
+    """The folder of this user's caches that cannot be written, and why; empty texts where both can."""
+    import platformdirs
+
+    for folder in filter(None, (os.environ.get("POCL_CACHE_DIR"), platformdirs.user_cache_dir())):
+        if why := _trouble(Path(folder)):
+            return folder, why
+    return "", ""
 
 
 def _trouble(folder: Path) -> str:

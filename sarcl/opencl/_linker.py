@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 import shutil
-import subprocess
-import sys
-import tempfile
+
+from . import _child
 
 PLATFORM = "Portable Computing Language"
 PATIENCE = 120.0  # s for the trial of a device in another process; 1 to 10 are usual
 TRIAL = "import sys; from sarcl.opencl import device_list; device_list.trial_of(int(sys.argv[1]))"
+REMEDY = "add its folder to PATH, usually /usr/bin, or install it (on Debian or Ubuntu: apt-get install binutils)"
 
 
 def is_missing(platform: str) -> bool:
@@ -20,24 +20,9 @@ def is_missing(platform: str) -> bool:
 
 def trouble(index: int) -> str:
     """Why device `index` builds no kernel without ld; "" where it does. Tried in another process, with empty caches."""
-    if not sys.executable or getattr(sys, "frozen", False):
+    with _child.empty_caches() as caches:
+        _, end = _child.run(TRIAL, str(index), environment=caches, patience=PATIENCE)
+    if not end.startswith("SIG"):
         return ""
-    with tempfile.TemporaryDirectory(prefix="sarcl-trial-") as folder:
-        own = {"XDG_CACHE_HOME": folder, "POCL_CACHE_DIR": folder, "PYOPENCL_NO_CACHE": "1"}
-        try:
-            process = subprocess.run(
-                [sys.executable, "-c", TRIAL, str(index)],
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL,
-                timeout=PATIENCE,
-                env={**os.environ, **own},
-            )
-        except (OSError, subprocess.TimeoutExpired):
-            return ""
-    if process.returncode >= 0:
-        return ""
-    return (
-        f"PoCL links kernels with the program ld, and there is none on PATH ({os.environ.get('PATH', '')!r:.200}): add "
-        "its folder to PATH, usually /usr/bin, or install it (on Debian or Ubuntu: apt-get install binutils)"
-    )
+    path = os.environ.get("PATH", "")
+    return f"PoCL links kernels with the program ld, and there is none on PATH ({path!r:.200}): {REMEDY}"

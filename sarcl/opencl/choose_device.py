@@ -11,7 +11,7 @@ from . import _cache_folder, _linker
 from .device import Device, DeviceChoice, once
 from .device_list import DeviceInfo, devices, distinct, listed, tried
 
-REMEDY = "On Debian or Ubuntu: sudo apt-get install -y pocl-opencl-icd"
+REMEDY = "sarcl doctor says what is wrong and how to mend it"
 
 
 class NoDeviceError(RuntimeError):
@@ -46,8 +46,9 @@ def open_device(choice: DeviceChoice | None = None) -> Device:
             if working:
                 return open_listed(max(working, key=lambda i: (i.rate, -i.index)).index)
     if not any(info.works for info in devices()):
-        remedy = _cache_folder.prepare() or ("" if any(_linker.is_missing(i.platform) for i in devices()) else REMEDY)
-        raise NoDeviceError(f"no OpenCL device could build a kernel. Found: {_listing()}. {remedy}".strip())
+        raise NoDeviceError(
+            f"no OpenCL device could build a kernel. Found: {_listing()}. {_cache_folder.prepare() or REMEDY}"
+        )
     raise NoDeviceError(f"{source} {choice!r} matches no working OpenCL device. Found: {_listing()}")
 
 
@@ -59,7 +60,7 @@ def with_float64(device: Device) -> Device:
     if not able:
         raise NoDeviceError(
             f"edges of shadows need float64, which {device.info.name!r} lacks, as every other OpenCL device here does; "
-            f"pass shadows=False, or install a driver for the CPU beside it. {REMEDY}"
+            f"pass shadows=False, or install a driver for the CPU beside it (docs/guide/install.md)"
         )
     return open_listed(max(able, key=lambda i: (i.rate, -i.index)).index)
 

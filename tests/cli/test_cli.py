@@ -148,7 +148,7 @@ def test_devices_lists_what_is_here():
     assert all(d.name in done.stdout for d in sarcl.devices())
 
 
-def test_no_device_is_status_3_with_the_line_to_type(here):
+def test_no_device_is_status_3_and_names_the_doctor(here):
     none = here / "none"
     none.mkdir()
     environment = {**os.environ, "OCL_ICD_VENDORS": str(none), "OCL_ICD_FILENAMES": ""}
@@ -161,7 +161,7 @@ def test_no_device_is_status_3_with_the_line_to_type(here):
     )
     if "no OpenCL" not in done.stderr:
         pytest.skip("this OpenCL loader does not obey OCL_ICD_VENDORS")
-    assert done.returncode == 3 and "pocl-opencl-icd" in done.stderr and "Traceback" not in done.stderr
+    assert done.returncode == 3 and "sarcl doctor says what is wrong" in done.stderr and "Traceback" not in done.stderr
 
 
 def test_a_device_name_that_matches_nothing_lists_what_there_is(raw_file, capsys):
