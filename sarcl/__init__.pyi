@@ -14,7 +14,10 @@ from .base.errors import SarclWarning as SarclWarning
 from .base.errors import ToleranceMissed as ToleranceMissed
 from .base.errors import ToleranceUnreachable as ToleranceUnreachable
 from .base.forecast import Forecast as Forecast
+from .base.options import Options as Options
+from .base.options import option as option
 from .base.report import Report as Report
+from .base.verb import verb as verb
 from .base.version import __version__ as __version__
 from .earth.elevation import ElevationModel as ElevationModel
 from .effects import motion as motion

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import Field, dataclass, field, fields, replace
 from typing import Any, ClassVar
 
-Check = Callable[[str, Any], Any]
+Check = Callable[..., object]  # check(name, value)
 _KEY = "option"  # of a field's metadata
 
 
@@ -27,7 +27,7 @@ class Option:
     in_files: bool
 
 
-def option(default: Any, doc: str = "", check: Check | None = None, *, in_files: bool = True) -> Any:
+def option(default: object, doc: str = "", check: Check | None = None, *, in_files: bool = True) -> Any:
     """The field of an option. Where the record inherits the option, `doc` and `check` may be left out: those of the
     nearest base count."""
     return field(default=default, metadata={_KEY: Option(inspect.cleandoc(doc), check, in_files)})

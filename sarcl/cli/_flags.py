@@ -13,3 +13,6 @@ _TABLES = json.loads(get_data(__package__, "flags.json") or "")
 DEFAULTS: dict[str, dict[str, Any]] = _TABLES["defaults"]
 # verb -> option -> the words that it takes, where it takes nothing else
 CHOICES: dict[str, dict[str, list[str]]] = _TABLES["choices"]
+
+# methods of `sarcl focus` of sarcl itself
+METHODS = (*CHOICES["backproject"]["method"], "polar_format", "range_doppler")

@@ -95,7 +95,7 @@ class Job:
         for path in paths:
             if Path(path).resolve() in sources:
                 raise ValueError(f"output {path!r} is also read by this command; choose another name")
-            if formats.named(path, among) is None:
+            if formats.named(path, among) is None and formats.added(path) is None:
                 endings = formats.suggested(among)
                 raise ValueError(f"output {path!r} {formats.ending_of(path)}; choose a name that ends in {endings}")
             self.expect(path, n_bytes)

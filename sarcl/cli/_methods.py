@@ -1,14 +1,20 @@
-"""The methods of `sarcl focus --method`: which options each takes, its plan, and its image."""
+"""The methods of `sarcl focus --method`: which options each takes, its plan, and its image.
+
+A method that is none of sarcl's is the verb of an installed package, called with (raw, grid).
+"""
 
 from __future__ import annotations
 
 import argparse
+import tomllib
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from .. import verbs
+from ..base.options import described
+from ..base.text import unknown
 from ..io import formats
-from ._flags import DEFAULTS
+from ._flags import DEFAULTS, METHODS
 
 if TYPE_CHECKING:
     from ..model.image import Image
@@ -43,6 +49,12 @@ class Method:
     @classmethod
     def of(cls, args: argparse.Namespace) -> Method:
         """The method that is asked for. ValueError names an option that it does not take."""
+        if args.method not in METHODS:
+            return cls(args.method, _added_options(args))
+        if args.option:
+            raise ValueError(
+                f"--option is for methods of installed packages; --method {args.method} takes its own flags"
+            )
         name = args.method if args.method in TAKES else "backproject"
         values = {k: v for k, v in vars(args).items() if v is not None and v is not False and k != "method"}
         for option in values:
@@ -58,16 +70,38 @@ class Method:
 
     def plan(self, raw: PhaseHistory, grid: ImageGrid | None, device: object) -> Any:
         """The Forecast."""
-        return verbs.plan(getattr(verbs, self.name), *self._subjects(raw, grid), **self.options, device=device)
+        on = {"device": device} if "device" in described(getattr(verbs, self.name).options) else {}
+        return verbs.plan(getattr(verbs, self.name), *self._subjects(raw, grid), **self.options, **on)
 
     def image(self, raw: PhaseHistory, grid: ImageGrid | None, device: object, **running: object) -> Image | None:
         """The image; None for a piece. running: `out`, `progress`, and `tile` and `resume` of backproject."""
         verb = getattr(verbs, self.name)
-        image: Image | None = verb(*self._subjects(raw, grid), **self.options, device=device, **running)
+        known, out = described(verb.options), running.get("out")
+        running = {name: value for name, value in {"device": device, **running}.items() if name in known}
+        image: Image | None = verb(*self._subjects(raw, grid), **self.options, **running)
+        if image is not None and isinstance(out, str) and "out" not in known:
+            image.save(out)
         return image
 
     def _subjects(self, raw: PhaseHistory, grid: ImageGrid | None) -> tuple[Any, ...]:
         return (raw,) if grid is None else (raw, grid)
+
+
+def _added_options(args: argparse.Namespace) -> dict[str, object]:
+    """Options of the verb of an installed package: flags of other methods, and NAME=VALUE of --option, as in TOML."""
+    known = [*described(getattr(verbs, args.method).options)]
+    flags = {name for verb in TAKES for name in DEFAULTS[verb]} - {"method", *PLANE, *GROUND, *RUN}
+    options = {k: v for k, v in vars(args).items() if k in flags and v is not None and v is not False}
+    for text in args.option:
+        name, _, value = text.partition("=")
+        try:
+            options[name] = tomllib.loads(f"value = {value}")["value"]
+        except tomllib.TOMLDecodeError:
+            raise ValueError(f"--option {text}: give NAME=VALUE, with a value of TOML, such as 0.5 or true") from None
+    for name in options:
+        if name not in known:
+            raise ValueError(f"--method {args.method} has {unknown(name, known, 'option')}")
+    return options
 
 
 def heights(args: argparse.Namespace) -> object:

@@ -15,8 +15,8 @@ import sys
 from collections.abc import Callable
 from typing import Any, NoReturn
 
-from ..io import formats
-from ._flags import CHOICES, DEFAULTS
+from ..io import entry_points, formats
+from ._flags import CHOICES, DEFAULTS, METHODS
 
 EPILOG = """examples:
   sarcl demo                                            simulate and focus a scene: out/demo.png
@@ -157,8 +157,9 @@ def _focus_method(p: argparse.ArgumentParser) -> None:
         "backprojection (default auto: the cheaper of direct and factorized); polar_format: plane wavefronts; "
         "range_doppler: straight tracks and orbits, by zero-Doppler time and slant range"
     )
-    methods = [*CHOICES["backproject"]["method"], "polar_format", "range_doppler"]
-    _add(how, "--method", text, choices=methods, default=DEFAULTS["backproject"]["method"])
+    text += "; or the name of a verb that an installed package adds"
+    _add(how, f"--method {{{','.join(METHODS)}}}", text, method, default=DEFAULTS["backproject"]["method"])
+    _add(how, "--option NAME=VALUE", "of such a verb; repeatable", action="append", default=[])
     _flag(how, "--dry-run", "print method, time, memory and error, and focus nothing")
     text = "hamming, taylor:SIDELOBE_DB:NBAR such as taylor:35:5, hann, kaiser:8.6 ...; or RANGE,CROSS-RANGE"
     _add(how, "--window", text, window)
@@ -265,6 +266,13 @@ def window(text: str) -> object:
         return parse(text)
     except ValueError as exc:
         raise argparse.ArgumentTypeError(str(exc)) from None
+
+
+def method(text: str) -> str:
+    """A method of sarcl, or the name of a verb that an installed package adds."""
+    if text in METHODS or text in (added := entry_points.names("verbs")):
+        return text
+    raise argparse.ArgumentTypeError(f"invalid choice: {text!r} (choose from {', '.join([*METHODS, *added])})")
 
 
 def size(text: str) -> float:

@@ -2,8 +2,10 @@
 
 For other folders:
 
+    added_grids    grids of installed packages: positions of their pixels, by blocks
     elevation      elevation models through rasterio: positions on WGS84
     cphd/          CPHD files
+    entry_points   objects that installed packages add: file formats, grids, scattering models, verbs
     geotiff        images as GeoTIFF through rasterio, with overviews
     formats        table of the file formats of phase histories and images: names, first bytes, reader, writers
     hdf5           plain values, arrays and reports in HDF5

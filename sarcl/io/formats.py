@@ -7,6 +7,7 @@ A new format is a new file of this folder and one line of FORMATS. That file hol
     ImageWriter(path, grid, dtype, resumes)     as in sarcl_hdf5
     job_of(path)                                where by_blocks is True: the mark of the job that made an image
 
+An installed package adds a format by an entry point of the group sarcl.formats (docs/developers/extensions.md).
 Nothing here loads NumPy, so that the command line can print its help at once.
 """
 
@@ -20,7 +21,7 @@ from types import ModuleType
 from typing import IO, TYPE_CHECKING, Any, Literal, TypeVar
 
 from ..base import arguments
-from . import input_paths
+from . import entry_points, input_paths
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -116,6 +117,9 @@ def load(path: Path, make: Make[T], **options: object) -> tuple[T, Format]:
     if is_zarr(path):
         return ZARR.functions.load(path, make), ZARR
     head = input_paths.head(path, folder="give the files in it, e.g. sorted(Path(folder).glob('*.mat'))")
+    functions = added(path)
+    if functions is not None:
+        return _function(functions, "load", path)(path), Format((path.suffix.lower(),))
     form = next((f for f in FORMATS if f.starts and head.startswith(f.starts)), None)
     if form is not None:
         return form.functions.load(path, make, **{n: v for n, v in options.items() if n in form.options}), form
@@ -124,6 +128,41 @@ def load(path: Path, make: Make[T], **options: object) -> tuple[T, Format]:
     is_named_so = any(path.suffix.lower() in f.endings for f in FORMATS if f.starts)
     although = f" although its name ends in {path.suffix!r}" if is_named_so else ""
     raise ValueError(f"{str(path)!r} {next(unreadable, unknown)}{although}; sarcl reads {readable('and')}")
+
+
+def added(path: PathLike) -> object | None:
+    """What an installed package adds for files of this ending: functions load(path) and save(path, value), or one of
+    them. None: sarcl has the ending itself, or no package adds it. ImportError as from `entry_points.added`."""
+    ending = Path(path).suffix.lower()
+    is_other = ending and named(path, [*FORMATS]) is None
+    return entry_points.added("formats", ending.removeprefix(".")) if is_other else None
+
+
+def save_added(path: PathLike, value: object) -> bool:
+    """Write a value in a format that an installed package adds; False where none does.
+
+    `path` is replaced when the file is complete. ValueError where the package only reads the format.
+    """
+    functions = added(path)
+    if functions is None:
+        return False
+    save, output_paths = _function(functions, "save", path), import_module(".output_paths", __package__)
+    target = output_paths.check_writable(path)
+
+    def write_to(new: Path) -> None:
+        save(new.with_name(target.name), value)  # libraries look at the ending
+        new.with_name(target.name).rename(new)
+
+    output_paths.put_in_place(target, write_to)
+    return True
+
+
+def _function(functions: object, name: str, path: PathLike) -> Callable[..., Any]:
+    """The function of an installed package of this name; ValueError where it has none."""
+    if not hasattr(functions, name):
+        raise ValueError(f"{str(path)!r}: the package for {Path(path).suffix} has no {name}(); choose another ending")
+    function: Callable[..., Any] = getattr(functions, name)
+    return function
 
 
 def is_zarr(path: Path) -> bool:

@@ -1,7 +1,7 @@
 """Images as xarray writes them: Zarr stores (x.zarr, a folder) and NetCDF files (x.nc); pip install sarcl[xarray].
 
-The datasets are those of model/_labelled.py, which hold every field of an Image. NetCDF has no complex numbers: there
-data is data_real and data_imag. A report or XML of more than 60 kB is a variable there: no
+The datasets are those of sarcl/model/_labelled.py, which hold every field of an Image. NetCDF has no complex numbers:
+there data is data_real and data_imag. A report or XML of more than 60 kB is a variable there: no
 attribute of NetCDF holds it.
 """
 

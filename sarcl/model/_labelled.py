@@ -1,7 +1,7 @@
 """Images and echoes as xarray datasets: every field by its name, coordinates and units beside it.
 
 A field is a variable where it is an array of several rows, else an attribute; None is left out. Fields of the grid have
-names that begin with grid_. io/labelled_files.py writes these datasets, and gives their fields back.
+names that begin with grid_. sarcl/io/labelled_files.py writes these datasets, and gives their fields back.
 """
 
 from __future__ import annotations

@@ -355,6 +355,8 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
 
         image_formats = formats.writing(*formats.OF_IMAGES, "product")
         form = formats.named(arguments.path("path", path), image_formats)
+        if form is None and not options and formats.save_added(path, self):
+            return
         if form is None:
             endings = formats.suggested(image_formats, "'")
             raise ValueError(f"image path {str(path)!r} {formats.ending_of(path)}; choose {endings}")

@@ -25,8 +25,8 @@ MOST_NUMBERED = 2**63 - 1  # largest number of pixels that int64 can count
 
 @dataclass(frozen=True, eq=False)
 class ImageGrid:
-    """Pixel positions: a plane (`ImageGrid.plane`), points of terrain (`on_terrain`), pixels of a map (`on_map`) or any
-    points (`points`).
+    """Pixel positions: a plane (`ImageGrid.plane`), points of terrain (`on_terrain`), pixels of a map (`on_map`), any
+    points (`points`), or a grid that an installed package adds (`extension`).
 
     shape    of the image
     center, spacing, x_axis, y_axis   of a plane: pixel [i, j] lies at
@@ -223,6 +223,16 @@ class ImageGrid:
                 raise ValueError(f"{name} must increase in even steps; give one per row (times) or column (ranges)")
             axes.append(axis)
         return replace(grid, times=axes[0], ranges=axes[1])
+
+    @classmethod
+    def extension(cls, name: str, **options: object) -> ImageGrid:
+        """The grid that an installed package adds under a name (docs/developers/extensions.md), with its options.
+
+        ValueError for a name that no package adds; ImportError for a package that cannot be loaded; and as `points`.
+        """
+        from ..io.added_grids import positions_of
+
+        return cls.points(positions_of(name, options))
 
     def on_earth(self, longitude: float, latitude: float, height: float = 0.0) -> ImageGrid:
         """This grid, in x east, y north, z up of a place, in Earth-fixed coordinates: see `Scene.on_earth`."""

@@ -340,6 +340,8 @@ class PhaseHistory(EchoRows):
             raise ValueError(
                 f"origin, axes, metadata, domain, sgn and version are for CPHD, and {str(path)!r} does not end in .cphd"
             )
+        if formats.save_added(path, self):
+            return
         writer = formats.writer_functions(path, "phase history").EchoWriter(
             path, self.n_rows, self.n_samples, self.samples.dtype
         )

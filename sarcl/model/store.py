@@ -64,7 +64,8 @@ def read(
     blur the others by 6 % and move the scene by 0.7 m.
     A CPHD file (pip install sarcl[formats]), by its path or an open binary file, gives a PhaseHistory in Earth-fixed
     coordinates, whose samples stay in the file. Its channels become rows where they have equally many samples.
-    A SICD file whose grid is a plane gives an Image, whose pixels stay in the file.
+    A SICD file whose grid is a plane gives an Image, whose pixels stay in the file. An ending that sarcl has not may be
+    that of an installed package (docs/developers/extensions.md).
     external=True follows links and datasets of an HDF5 file that lead into other files, for files that you trust.
     channel, polarization   only these rows, as `PhaseHistory.select` takes them; of CPHD the name of a channel too
     FileNotFoundError names the missing file; ValueError the file that is of unknown format, truncated, damaged or
@@ -86,6 +87,10 @@ def read(
     if isinstance(path, (str, os.PathLike)):
         options = {"autofocus": autofocus, "external": external, **rows}
         result, form = formats.load(arguments.path("path", path), _make, **options)
+        if not isinstance(result, (PhaseHistory, Image)):
+            raise TypeError(
+                f"the package for {form.endings[0]} read {str(path)!r} as {type(result).__name__}, not echoes"
+            )
     elif hasattr(path, "read") and hasattr(path, "seek"):
         result, form = formats.load_open(cast(IO[bytes], path), _make, **rows)
     else:

@@ -2,6 +2,7 @@
 
 For other folders:
 
+    added_models           scattering models of installed packages, in float64 on the host
     antenna_weight_error   errors of antenna_weights over facets, over the band and in float32
     antenna_weights        antenna gains, spreading loss and the radar's factor per scatterer
     double_diffraction     waves from one border of a flat face to another

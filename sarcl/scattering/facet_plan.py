@@ -170,8 +170,9 @@ class _PlanSearch:
             return False
         if self.exact is not None and count > WORTH_FLOAT32 * self.exact.n_facets:
             return False
-        # the kernels know neither forward scatter nor thin sheets
-        on_host = self.view.antennas.forward or bool(self.view.scene.sheets.any())
+        # the kernels know neither forward scatter, nor thin sheets, nor the scattering models of installed packages
+        scene = self.view.scene
+        on_host = self.view.antennas.forward or bool(scene.sheets.any()) or bool(scene.scattering_models)
         is_small = on_host or (
             count * limits.terms <= limits.float64_terms and (self.cross_ratio <= DARK or limits.adds_others)
         )

@@ -224,6 +224,7 @@ class FacetSet:
         light  of this pulse at these frequencies: facets that are lit in part; None: every facet is seen whole
         """
         from ._rough_surface import rough_mean
+        from .added_models import put_into
         from .physical_optics import normals_and_areas, scattering_parts, triangle_mean, turned
 
         places = centroids(self.triangles)
@@ -269,6 +270,10 @@ class FacetSet:
                 if behind is not None:
                     matrix -= behind[0] * parts[3, :, i] + behind[1] * (parts[0, :, i] - parts[3, :, i])
                 np.multiply(mean, matrix, out=out[first : first + step, :, i])
+            if any(m.scattering for m in self.materials):
+                looks, block = (facing, to_tx, to_rx), frequencies[first : first + step]
+                kinds = self.materials, self.material
+                put_into(out[first : first + step], mean, kinds, looks, block, vertical, some, forward=self.forward)
         return out
 
     def _coefficients(

@@ -81,7 +81,7 @@ class Builder:
             return self.one("grid")
         with self.scenario.where.blame(("grid", kind), table):
             local = on_terrain(place, table) if kind == "on_terrain" else table
-        grid: ImageGrid = self.call(("grid", kind), local, _schema.calls("grid")[kind])
+        grid: ImageGrid = self.call(("grid", kind), local, _schema.calls("grid", [kind])[kind])
         return grid.on_earth(place.longitude, place.latitude, place.height)
 
     def scene(self) -> Scene:
@@ -137,8 +137,8 @@ class Builder:
     def one(self, name: str) -> Any:
         """The object that a section describes in one table."""
         table = self.section(name)
-        calls = _schema.calls(name)
         kind = next(iter(table))
+        calls = _schema.calls(name, [kind])
         if kind in calls:
             return self.call((name, kind), table[kind], calls[kind])
         return self.call((name,), table, calls[""])

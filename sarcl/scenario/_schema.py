@@ -7,6 +7,7 @@ arguments, read from the signature, so that file format and library always agree
 from __future__ import annotations
 
 import datetime
+import functools
 import inspect
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping
@@ -19,6 +20,7 @@ from typing import Any
 from ..base.errors import ToleranceMissed, ToleranceUnreachable
 from ..base.options import described
 from ..base.text import unknown
+from ..io import entry_points
 
 Path = tuple[str | int, ...]
 Call = Callable[..., Any]
@@ -80,8 +82,10 @@ _CALLS: dict[str, dict[str, str]] = {
 SECTIONS = tuple(_CALLS)
 
 
-def calls(section: str) -> dict[str, Call]:
+def calls(section: str, kinds: Collection[str] = ()) -> dict[str, Call]:
     """The calls that a section can describe, by the name of the table; "" is the section's own table.
+
+    kinds  names of the tables that a file has: a grid may be one of an installed package
 
     Each section imports only the folders that it needs: the verbs load pyopencl.
     """
@@ -93,6 +97,13 @@ def calls(section: str) -> dict[str, Call]:
         from ..scene import shapes
 
         known |= {shape.__name__: shape for shape in (*shapes.SHAPES, shapes.luneburg)}
+    if section == "grid":
+        for kind in kinds:
+            if kind not in known and callable(source := entry_points.added("grids", kind)):
+                extension = functools.partial(
+                    import_module("..model.image_grid", __package__).ImageGrid.extension, kind
+                )
+                known[kind] = functools.wraps(source)(extension)  # with the signature of the package's
     return known
 
 
@@ -155,7 +166,7 @@ class Where:
 
 def check_section(section: str, table: object, where: Where) -> None:
     """Check keys and types of a section. ValueError names the line of an unknown key, a missing key or a wrong type."""
-    known = calls(section)
+    known = calls(section, table if isinstance(table, Mapping) else ())
     if section == "materials" and isinstance(table, Mapping):
         for name, part in table.items():
             if not isinstance(part, Mapping):

@@ -11,6 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..base import validation
 from ..base.errors import warn
+from ..base.text import unknown
+from ..io import entry_points
 
 VACUUM_PERMITTIVITY = 8.8541878128e-12  # F/m
 Diagram = Literal["smooth", "isotropic", "cos", "cos2", "exp", "sinc"]
@@ -36,6 +38,8 @@ class Material:
     name          for messages and scenario files
     thickness     m, of a smooth sheet with its middle in the facets' plane: it reflects at both of its sides and lets
                   waves through. For open facets that reflect from both sides; default 0, a half space
+    scattering    name of a scattering model that an installed package adds, in place of Fresnel's coefficients: for
+                  `echo` and `rcs` of smooth facets, in float64 (docs/developers/extensions.md); "": none
 
     `Material()` is a perfect conductor; a real eps_r alone gives a lossless dielectric. ValueError for impossible
     values.
@@ -52,6 +56,7 @@ class Material:
     thickness: float = 0.0
     exponents: tuple[float, float] = (0.0, 0.0)
     band: tuple[float, float] | None = None
+    scattering: str = ""
 
     def __post_init__(self) -> None:
         validation.choice("diagram", self.diagram, DIAGRAMS)
@@ -110,8 +115,13 @@ class Material:
                 f"thickness is {self.thickness:g} m of a perfect conductor or a rough surface; give it to smooth "
                 "dielectrics, and to metals a conductivity"
             )
-        if not isinstance(self.name, str):
-            raise TypeError(f"name is a {type(self.name).__name__}; give a string")
+        for name in ("name", "scattering"):
+            if not isinstance(getattr(self, name), str):
+                raise TypeError(f"{name} is a {type(getattr(self, name)).__name__}; give a string")
+        if self.scattering and self.scattering not in (known := entry_points.names("scattering")):
+            raise ValueError(unknown(self.scattering, known, "scattering model of an installed package"))
+        if self.scattering and (self.thickness or self.height or self.diagram not in COHERENT):
+            raise ValueError(f"scattering is {self.scattering!r}: a model is that of smooth facets, without thickness")
 
     @property
     def conducting(self) -> bool:

@@ -343,6 +343,11 @@ class Scene(NotebookTable):
         return np.array([m.thickness > 0 for m in self.materials], bool)[self.material]
 
     @property
+    def scattering_models(self) -> tuple[str, ...]:
+        """Names of the scattering models of installed packages by which facets scatter."""
+        return tuple(m.scattering for i, m in enumerate(self.materials) if m.scattering and (self.material == i).any())
+
+    @property
     def has_random_points(self) -> bool:
         """Whether point_roughness is not yet realized."""
         return any(self.point_roughness.strides) and bool(self.point_roughness.any())

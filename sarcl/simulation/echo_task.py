@@ -14,7 +14,7 @@ from ..model.trajectory import Trajectory
 from ..model.waveform import Waveform
 from ..numerics.pulse_geometry import PulseGeometry
 from ..opencl.device import Device
-from ..scattering import antenna_weights
+from ..scattering import added_models, antenna_weights
 from ..scattering.antenna_weights import AntennaWeights
 from ..scattering.facet_kinds import random
 from ..scattering.thin_sheets import ThinSheets, may_hide
@@ -79,6 +79,8 @@ def echo_task(scene: Scene, waveform: Waveform, track: Trajectory, options: Echo
                 f"bounces is {options.bounces}, and the scene has thin sheets (a material with a thickness), of which "
                 "single reflections alone are computed: give bounces=1, or materials without thickness"
             )
+        if options.bounces > 1 or options.edges:
+            added_models.refuse(real, "bounces" if options.bounces > 1 else "edges", "leave it out")
         tx, rx = sends.positions, echo_sampling.receiver_positions(sends, hears)
         refuse_with_sheets(options, real, PulseGeometry(tx, rx).ends)
         refuse_inside(real, *([tx] if hears is None else [tx, rx]))

@@ -1,8 +1,8 @@
 """The verbs: from a scene to echoes or cross sections, from echoes to an image; and plan(), which forecasts them.
 
-A verb is imported from its room when it is first used: an image needs none of the rooms that make echoes. Types of
-their arguments for type checkers and editors: __init__.pyi, which docs/developers/write_options.py makes of the verbs'
-records.
+A verb is imported from its room when it is first used: an image needs none of the rooms that make echoes. An installed
+package adds a verb by an entry point of the group sarcl.verbs (docs/developers/extensions.md). Types of the arguments
+for type checkers and editors: __init__.pyi, which docs/developers/write_options.py makes of the verbs' records.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from importlib import import_module
 from typing import Any
 
 from ..base.forecast import Forecast as Forecast
+from ..io import entry_points
 from ..model.lazy_rows import file_stamps
 from ..model.phase_history import PhaseHistory
 
@@ -32,7 +33,12 @@ __all__ = ["backproject", "echo", "fullwave_echo", "plan", "polar_format", "rang
 def __getattr__(name: str) -> Any:
     homes = HOMES | NUMBERS
     if name not in homes:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}; it has {', '.join(__all__)}")
+        verb = None if name.startswith("_") else entry_points.added("verbs", name)
+        if verb is None:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}; it has {', '.join(__all__)}")
+        if not hasattr(verb, "planned"):
+            raise TypeError(f"the entry point {name!r} of sarcl.verbs is {verb!r:.60}; make it by @sarcl.verb(record)")
+        return verb
     verb = getattr(import_module(f"..{homes[name]}", __name__), name)
     globals()[name] = verb
     return verb

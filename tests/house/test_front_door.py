@@ -72,7 +72,7 @@ def test_all_of_the_contract_is_there():
         "echo beam ambiguity compress map_aperture backproject polar_format autofocus measure read concatenate devices "
         "plan Forecast PointResponse Ambiguity add_noise NoDeviceError SarclWarning "
         "ToleranceMissed ToleranceUnreachable Orbit ElevationModel spectral_echo range_doppler rcs "
-        "doppler_centroid effective_velocity EffectiveVelocity fullwave_echo default_grid"
+        "doppler_centroid effective_velocity EffectiveVelocity fullwave_echo default_grid Options option verb"
     ).split()
     assert set(sarcl.__all__) == {*wanted, *MODULES}
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...scattering import added_models
 from ...scene.material import VACUUM_PERMITTIVITY, Material
 from ...scene.scene import Scene
 
@@ -41,6 +42,7 @@ def check_bodies(scene: Scene) -> None:
                 "conductivity, such as sarcl.Material(eps_r=3, conductivity=0.01), or reflectivity 1",
             )
         )
+    added_models.refuse(scene, "fullwave_echo", "use echo")
     for material in scene.materials:
         if material.height or material.diagram not in ("smooth", "sinc"):
             raise ValueError(

@@ -15,6 +15,7 @@ from ...base.errors import NotApplicable
 from ...base.report import SMALLER_TOLERANCE, ErrorTerm
 from ...base.stage_timer import Clock
 from ...numerics.pulse_geometry import PulseGeometry
+from ...scattering import added_models
 from ...scattering.antenna_weights import AntennaWeights
 from ..bounces.bounce_spreader import BounceScene, BounceSpreader
 from ..edges.edge_echoes import EdgeEchoes, PreparedEdges
@@ -55,6 +56,7 @@ def refuse_together(task: RcsTask) -> None:
         )
     if options.check:
         raise NotApplicable(f"check=True recomputes single reflections alone, not those of {asked[0]}; leave one out")
+    added_models.refuse(task.scene, asked[0], "leave it out")
     if task.scene.sheets.any():
         raise NotApplicable(
             f"the scene has thin sheets (a material with a thickness), not computed with {asked[0]}: leave it out, or "

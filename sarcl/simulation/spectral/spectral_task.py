@@ -13,7 +13,7 @@ from ...model.trajectory import Trajectory
 from ...model.waveform import Waveform
 from ...numerics.pulse_geometry import PulseGeometry
 from ...opencl.device import Device
-from ...scattering import antenna_weights
+from ...scattering import added_models, antenna_weights
 from ...scene.scene import Scene
 from .. import echo_sampling
 from ..echo_request import EchoRequest
@@ -75,6 +75,7 @@ def spectral_task(
         )
     if scene.sheets.any():
         raise NotApplicable("the scene has thin sheets (a material with a thickness), for which use echo or rcs")
+    added_models.refuse(scene, "spectral_echo", "use echo")
     line = straight_track(track, waveform.center + waveform.bandwidth / 2, STRAIGHT * request.tolerance)
     tx = track.positions
     point = scene.center if options.reference is None else np.asarray(options.reference)
