@@ -198,7 +198,9 @@ class BackprojectPlan:
         if unseen and unseen.warning() and done:
             warn(unseen.warning())
         pairs, seconds = CHECKED * task.raw.n_rows * self.raw.n_samples, clock.seconds.get("backproject", 0.0)
-        measured = self.options.measured(pairs, seconds, clock, lambda: _measure_error(task, grid, output.data))
+        measured = self.options.measured(
+            pairs, seconds, clock, lambda: _measure_error(task, grid, output.data, self.options.tolerance)
+        )
         gain = self._gain(done)
         clock.lap("gain")
         plan = self.chosen.plan.describe(self.chosen.method)
@@ -258,7 +260,7 @@ def _antenna_gain(
     return float(flat.flat[0]) if flat.min() == flat.max() > 0 else flat.reshape(task.grid.shape)
 
 
-def _measure_error(task: FocusingTask, grid: ImageGrid, data: Any) -> float:  # data: an array, or a dataset of a file
+def _measure_error(task: FocusingTask, grid: ImageGrid, data: Any, tolerance: float) -> float:
     """Relative error at up to 256 random pixels against the exact float64 sum, as `tolerance` is defined."""
     from ..reference.backproject import PerPoint
     from ..reference.backproject import backproject as exact
@@ -270,10 +272,4 @@ def _measure_error(task: FocusingTask, grid: ImageGrid, data: Any) -> float:  # 
         share = shares(task, positions)
     weights = task.sample_weight, task.row_weight
     truth, spread = exact(task.raw, positions, *weights, task.wrap, beam, EDGE, PerPoint(share))
-    got = (
-        np.asarray(data)[index]
-        if isinstance(data, np.ndarray)
-        else np.array([data[i] for i in zip(*index, strict=True)])
-    )
-    clear = np.isfinite(truth)
-    return relative_error(got[clear], truth[clear], spread)
+    return relative_error(data, index, truth, spread, tolerance)

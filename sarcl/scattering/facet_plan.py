@@ -163,9 +163,9 @@ class _PlanSearch:
     def proceeds_beyond(self, edge: float) -> bool:
         """Consider facets cut to `edge`, m. Whether shorter edges may allow a cheaper plan."""
         mirror, limits = self.view.mirror, self.limits
-        on_host = self.rough[0] + float(np.maximum(1.0, PIECES * (self.longest[mirror] / edge) ** 2).sum())
-        count = on_host + self.rough[1]
-        self.fits = on_host <= self.in_memory
+        n_on_host = self.rough[0] + float(np.maximum(1.0, PIECES * (self.longest[mirror] / edge) ** 2).sum())
+        count = n_on_host + self.rough[1]
+        self.fits = n_on_host <= self.in_memory
         if not self.fits or count > limits.most:
             return False
         if self.exact is not None and count > WORTH_FLOAT32 * self.exact.n_facets:
@@ -190,7 +190,7 @@ class _PlanSearch:
             self._choose_nodes(edge, gain, error, count)
         else:
             self.least = min(self.least, self._required(gain, error))
-        is_settled = self.best is not None and on_host > 4 * (self.best.n_facets - self.elsewhere)
+        is_settled = self.best is not None and n_on_host > 4 * (self.best.n_facets - self.elsewhere)
         return limits.cuts and bool(mirror.any()) and not is_settled
 
     def _required(self, gain: float, error: float) -> float:

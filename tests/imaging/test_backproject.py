@@ -13,6 +13,7 @@ import sarcl
 from sarcl.base.errors import ToleranceUnreachable
 from sarcl.imaging.backproject import pixels_alone
 from sarcl.imaging.choose_method import choose
+from sarcl.imaging.focus_options import relative_error
 from sarcl.imaging.focusing_task import make_task
 from sarcl.reference.backproject import backproject as exact_image
 
@@ -354,3 +355,19 @@ def test_rows_of_several_polarizations_are_summed_only_where_the_sum_is_asked_fo
     assert np.linalg.norm(both - sum(parts)) <= 2e-3 * np.linalg.norm(both)
     with pytest.raises(TypeError, match="sum_polarizations is 'HH'"):
         sarcl.backproject(raw, PLANE, sum_polarizations="HH")
+
+
+@pytest.mark.parametrize("ratio", [0.5, 2.0])
+def test_the_measured_error_of_an_image_with_few_bright_pixels_is_that_of_the_image(ratio):
+    """Pixels chosen at random seldom meet the bright ones; their own norm would make 2.5e-3 of the image 1.1e-2."""
+    random, tolerance, shape = np.random.default_rng(4), 1e-2, (300, 200)
+    exact = 1e-3 * (random.standard_normal(shape) + 1j * random.standard_normal(shape))
+    exact[[20, 151, 250], [17, 60, 188]] = 40.0
+    wrong = random.standard_normal(shape) + 1j * random.standard_normal(shape)
+    data = exact + wrong * (ratio * tolerance * np.linalg.norm(exact) / np.linalg.norm(wrong))
+    index = tuple(random.integers(0, n, 256) for n in shape)
+    for image in (data, data.astype(np.complex64)):
+        measured = relative_error(image, index, exact[index], 0.0, tolerance)
+        assert measured == pytest.approx(ratio * tolerance, rel=0.15)
+    index = index[0][:2], index[1][:2]  # of an infinite sum, as at an antenna
+    assert relative_error(data, index, np.array([np.inf, exact[index][1]]), 0.0, tolerance) < 1.0

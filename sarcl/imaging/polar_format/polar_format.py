@@ -20,7 +20,7 @@ from ...numerics import cost_model
 from ...numerics.nufft2d import Gridder, make_plan, tile_of
 from ...numerics.range_profiles import check_digits
 from ...opencl.choose_device import open_device
-from ..focus_options import GridOptions, check_output, collection, finished, relative_error
+from ..focus_options import GridOptions, check_output, collection, finished, norm_of, relative_error
 from ..focusing_task import FocusingTask, make_task
 from ..forecast import speed
 from ._samples import WeightedRows
@@ -132,14 +132,16 @@ class PolarFormatPlan:
         on_progress = options.shares_of("polar format")
         data = self.engine.image(self.samples, grid.shape, self.budget, clock, on_progress)
         check_digits(self.samples.largest)
-        norm, random = _norm(data), float(np.sqrt(self.samples.energy() * grid.size))
+        norm, random = norm_of(data), float(np.sqrt(self.samples.energy() * grid.size))
         details = plan.describe()
         if norm < random:
             details["error of a dark image"] = f"{plan.predicted_error * random / norm:.1e}" if norm else "unknown"
         details |= _describe(self.bent)
         pairs = CHECKED * task.raw.n_rows * self.raw.n_samples
         seconds = clock.seconds["gridding"]
-        measured = options.measured(pairs, seconds, clock, lambda: _measure_error(task, self.waves, data))
+        measured = options.measured(
+            pairs, seconds, clock, lambda: _measure_error(task, self.waves, data, self.options.tolerance)
+        )
         image = Image(
             data,
             grid,
@@ -194,16 +196,10 @@ def _describe(bent: Curvature) -> dict[str, str]:
     }
 
 
-def _norm(data: np.ndarray) -> float:
-    """Euclidean norm of pixels, row by row in float64: squares of float32 overflow from 2e19 on, and vanish below
-    1e-23."""
-    return float(np.sqrt(sum(np.linalg.norm(row.astype(np.complex128)) ** 2 for row in data)))
-
-
-def _measure_error(task: FocusingTask, waves: Waves, data: np.ndarray) -> float:
+def _measure_error(task: FocusingTask, waves: Waves, data: np.ndarray, tolerance: float) -> float:
     """Relative error at up to 256 random pixels against the exact float64 sum."""
     from ...reference.polar_format import polar_format as exact
 
     index, positions = task.grid.sample(CHECKED, seed=0)
     truth, random = exact(task.raw, positions, waves.center, task.sample_weight, task.row_weight)
-    return relative_error(data[index], truth, random)
+    return relative_error(data, index, truth, random, tolerance)

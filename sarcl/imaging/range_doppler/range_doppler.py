@@ -150,7 +150,7 @@ def _measure_error(raw: PhaseHistory, task: RangeDopplerTask, grid: ImageGrid, d
         t = track.times[:, None]
         terms = terms._replace(longer=(plan.fit.range(u, r, t) - task.known.range(u, r, t)).T)
     truth, random = exact(raw, points, task.sample_weight, task.row_weight, wrap=True, per_point=terms)
-    return relative_error(data[index], truth, random)
+    return relative_error(data, index, truth, random, task.tolerance)
 
 
 def gain_of(
