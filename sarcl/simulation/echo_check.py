@@ -43,7 +43,10 @@ def draws_of(scene: SceneEchoes) -> int:
 
 
 def seconds_to_check(scene: SceneEchoes) -> float:
-    """About the seconds that `measure_error` takes, on one core."""
+    """About the seconds that `measure_error` takes, on one core; infinite with bounces, edges and what is seen through
+    sheets, whose integrals over facets of any size the reference adds up for minutes."""
+    if scene.bounced is not None or scene.edges is not None or scene.behind_sheets is not None:
+        return np.inf
     points, facets = 0 if scene.points is None else len(scene.points), sum(map(len, scene.facets))
     partly = sum(part.n_partly_lit for part in scene.facets)
     draws = draws_of(scene)

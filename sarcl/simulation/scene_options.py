@@ -88,5 +88,6 @@ class SceneOptions(BounceOptions, TrackOptions):
     )
     check: bool | None = option(
         None,
-        "recompute 256 random samples exactly, fewer above 20 000 facets; None: where that costs less than 2 %",
+        "recompute 256 random samples exactly, fewer above 20 000 facets; None: where that costs less than 2 %, not "
+        "with bounces, edges and thin sheets",
     )

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import sarcl
 from sarcl.base.errors import NotApplicable
+from sarcl.simulation.echo_check import worth_checking
 
 CHIRP = sarcl.Waveform.chirp(center=9.6e9, bandwidth=50e6, duration=1e-6)
 TRACK = sarcl.Trajectory.line(start=(1e3, 998, 1e3), velocity=(0, 1, 0), prf=1.0, n_pulses=4)
@@ -145,6 +148,17 @@ def test_sums_by_range_profiles_are_those_at_single_frequencies():
     assert raw.n_samples > 60  # far more than nodes over the band
     assert raw.report.measured_error is not None
     assert raw.report.measured_error <= raw.report.predicted_error
+
+
+@pytest.mark.parametrize("part", [None, "bounced", "edges", "behind_sheets"])
+def test_several_reflections_edges_and_sheets_are_checked_only_where_that_is_asked_for(part):
+    """However long the echoes took: the exact sums of these take minutes or hours."""
+    request = SimpleNamespace(clock=SimpleNamespace(seconds={"echo": 1e4}), limits=SimpleNamespace(checked_facets=100))
+    parts = dict.fromkeys(("points", "bounced", "edges", "behind_sheets"))
+    weights = SimpleNamespace(varies_over_band=False)
+    scene = SimpleNamespace(request=request, facets=(), weights=weights, **(parts | ({part: "some"} if part else {})))
+    assert worth_checking(scene, None) == (part is None)
+    assert worth_checking(scene, True) and not worth_checking(scene, False)
 
 
 def test_weak_reflections_are_left_out_and_counted():
