@@ -282,6 +282,11 @@ def lit(
                 anew each time they are asked for
 
     Warns with SarclWarning where nothing at all is illuminated.
+
+    >>> box = sarcl.shapes.box((4, 2, 3))
+    >>> lighting = sarcl.illumination.lit(box.triangles, track.positions, two_sided=False)
+    >>> lighting.error < 0.02
+    True
     """
     tx = array("tx", tx, np.float64, ("n_pulses", 3))
     ends = [tx] if rx is None else [tx, array("rx", rx, np.float64, (len(tx), 3))]
