@@ -13,7 +13,8 @@ version = release = __version__
 extensions = ["myst_parser"]
 root_doc = "index"
 exclude_patterns: list[str] = []
-nitpicky = False
+nitpicky = True  # of names between backticks; types of parameters are often those of other packages
+nitpick_ignore_regex = [("py:class|py:data|py:exc", ".*")]
 
 myst_enable_extensions = ["colon_fence", "deflist"]
 myst_heading_anchors = 4  # links to headings, as forges make them

@@ -33,11 +33,13 @@ def entries(doc: str) -> dict[str, str]:
 
 def examples(doc: str) -> list[str]:
     """Blocks of a docstring that begin with >>>."""
-    return [block for block in _blocks(doc) if _PROMPT.match(block)]
+    return [textwrap.dedent(block) for block in _blocks(doc) if _PROMPT.match(block)]
 
 
 def _blocks(doc: str) -> list[str]:
-    return [block.rstrip() for block in re.split(r"\n\s*\n", doc.strip("\n")) if block.strip()]
+    """Paragraphs; text that follows an indented paragraph without an empty line is one of its own."""
+    apart = re.sub(r"((?:^|\n\n)(?:    [^\n]*\n)+)(?=\S)", r"\1\n", doc.strip("\n"))
+    return [block.rstrip() for block in re.split(r"\n\s*\n", apart) if block.strip()]
 
 
 def _list(block: str) -> list[tuple[str, str]] | None:

@@ -22,7 +22,7 @@ from sarcl import verbs
 # Functions and classes of public modules that serve other rooms of the package: module -> names without a place here.
 INTERNAL = {
     "array_factor": {"reduced", "geometric"},
-    "illumination": {"Span", "shares_of", "Illumination", "Lighting", "IlluminationTask", "illuminated"},
+    "illumination": {"Span", "shares_of", "Lighting", "IlluminationTask", "illuminated"},
     "noise": {"Noisy", "complex_gaussian", "level_of"},
     "papers": {"open_lab"},
     "pointing": {"velocities", "rotations"},
@@ -117,7 +117,8 @@ def _page(name: Name) -> str:
     if not _is_module(name.value):
         return f"# {name.path}\n\n{_entry(name)}"
     inside = [n for n in public_names().values() if n.path.startswith(f"{name.path}.")]
-    text = f"# sarcl.{name.path}\n\n```{{py:module}} sarcl.{name.path}\n```\n\n{_text(name.doc, {}, name.path)}\n"
+    place = f"```{{py:module}} sarcl.{name.path}\n```\n\n```{{py:currentmodule}} None\n```"
+    text = f"# sarcl.{name.path}\n\n{place}\n\n{_text(name.doc, {}, name.path)}\n"
     if examples(name.doc):
         text += _note()
     return text + "".join(f"\n## {n.path.partition('.')[2]}\n\n{_entry(n)}" for n in inside)

@@ -93,6 +93,11 @@ class Illumination:
     sampling    estimated error of the amplitudes, roots of the shares, relative to their norm: shares from samples
     motion      the same of levels between viewpoints
     reached     accuracy that can be asked for, where the error is larger than what was
+
+    >>> box = sarcl.shapes.box((4, 2, 3))
+    >>> light = sarcl.illumination.lit(box.triangles, track.positions, two_sided=False)
+    >>> light.fraction_at(20).shape, light.blocks.shape == (len(light.viewpoints), 2)
+    ((12,), True)
     """
 
     blocks: np.ndarray
