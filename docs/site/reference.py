@@ -152,7 +152,8 @@ def _directive(
     kind: str, path: str, signature: str, body: str, flags: list[str] | None = None, *, colons: int = 4
 ) -> str:
     fence = ":" * colons
-    return "\n".join([f"{fence}{{py:{kind}}} sarcl.{path}{signature}", *(flags or []), "", body.rstrip(), fence, ""])
+    flags = [*(flags or []), *([":no-contents-entry:"] if colons == 6 else [])]  # its heading has the entry
+    return "\n".join([f"{fence}{{py:{kind}}} sarcl.{path}{signature}", *flags, "", body.rstrip(), fence, ""])
 
 
 def _contents(groups: dict[str, list[Name]]) -> str:
