@@ -37,9 +37,19 @@ def examples(doc: str) -> list[str]:
 
 
 def _blocks(doc: str) -> list[str]:
-    """Paragraphs; text that follows an indented paragraph without an empty line is one of its own."""
+    """Paragraphs; text behind an indented paragraph or a list, without an empty line, is one of its own."""
     apart = re.sub(r"((?:^|\n\n)(?:    [^\n]*\n)+)(?=\S)", r"\1\n", doc.strip("\n"))
-    return [block.rstrip() for block in re.split(r"\n\s*\n", apart) if block.strip()]
+    blocks = [block.rstrip() for block in re.split(r"\n\s*\n", apart) if block.strip()]
+    return [part for block in blocks for part in _parts(block)]
+
+
+def _parts(block: str) -> list[str]:
+    """A list of parameters and the text behind it; other blocks as they are."""
+    lines = block.splitlines()
+    if not _ENTRY.fullmatch(lines[0]):
+        return [block]
+    end = next((i for i, line in enumerate(lines) if not (line.startswith(" ") or _ENTRY.fullmatch(line))), len(lines))
+    return ["\n".join(lines[:end]), *(["\n".join(lines[end:])] if end < len(lines) else [])]
 
 
 def _list(block: str) -> list[tuple[str, str]] | None:

@@ -38,6 +38,7 @@ def facet_shares(
     """Share of the area of each facet that both antennas see at each pulse, 0 to 1: float32 (n_pulses, k).
 
     Exact, as `echo` takes it: facets are clipped along the shadows' edges, and one-sided ones that face away are dark.
+
     device    leaves this to another device on the machine where it has no float64;  progress  called as
               progress(pulse, pulses)
 

@@ -87,7 +87,7 @@ class Illumination:
     dark        (k,) bool: facets of which nothing is illuminated at any viewpoint
     full        (k,) bool: facets that are wholly illuminated at every viewpoint
     changing    (k,) bool: facets whose shares are not the same at every viewpoint
-    dark_facets number of facets of which nothing is illuminated, per block (n_blocks,)
+    dark_facets  number of facets of which nothing is illuminated, per block (n_blocks,)
     window      (first, stop): pulses that `spans` and `fraction_at` count from `first`; all other members are of the
                 whole track
     sampling    estimated error of the amplitudes, roots of the shares, relative to their norm: shares from samples

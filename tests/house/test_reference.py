@@ -92,7 +92,6 @@ def test_docstrings_become_markdown(docstrings):
         first    its meaning, m,
                  continued;  second  another, of `thing`
         a, b     both; see docs/theory/facets.md
-
         Returns a number. Source: none.
 
         >>> 1 + 1
