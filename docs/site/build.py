@@ -7,6 +7,8 @@ errors.
 
 from __future__ import annotations
 
+import base64
+import json
 import re
 import shutil
 import sys
@@ -18,7 +20,7 @@ ROOT = Path(__file__).parents[2]
 SITE = ROOT / "out" / "site"
 CONTENTS = Path("docs/README.md")
 PICTURES = (".png", ".svg")
-_ITEM = re.compile(r"^(?:\d+\.|-) \[([^\]]+)\]\(([^)#]+)\.md\)", re.M)
+_ITEM = re.compile(r"^(?:\d+\.|-) \[([^\]]+)\]\(([^)#]+)\.(?:md|ipynb)\)", re.M)
 _CODE = re.compile(r"^(```.*?^```|#[^\n]*|    [^\n]*)$|(?<![\[`])`(sarcl\.[\w.]+)`(?!\])", re.M | re.S)
 _OUTSIDE = re.compile(r"\]\(((?:\.\./)+(?!README|CHANGELOG|docs/)[^)#]+\.md)")
 
@@ -32,10 +34,12 @@ def stage(source: Path) -> None:
             for link in _OUTSIDE.findall(path.read_text()) if path.suffix == ".md" else ():
                 page = (path.parent / link).resolve()
                 _copy(page, source / page.relative_to(ROOT), "---\norphan: true\n---\n\n")
+    for path in (ROOT / "docs" / "notebooks").glob("*.ipynb"):
+        _notebook(path, (source / path.relative_to(ROOT)).with_suffix(".md"))
     (source / "README.md").rename(source / "index.md")
     for path in source.rglob("*.md"):
         up = "../" * (len(path.relative_to(source).parts) - 1)
-        text = path.read_text().replace(f"]({up}README.md", f"]({up}index.md")
+        text = path.read_text().replace(f"]({up}README.md", f"]({up}index.md").replace(".ipynb)", ".md)")
         path.write_text(_CODE.sub(_to_reference, text))
     (source / "reference").mkdir()
     for name, text in pages().items():
@@ -55,6 +59,24 @@ def _copy(path: Path, target: Path, head: str = "") -> None:
         target.write_text(head + path.read_text())
     else:
         shutil.copy(path, target)
+
+
+def _notebook(path: Path, target: Path) -> None:
+    """A notebook as a page: its text, its code, and what it printed and drew when it was stored."""
+    target.parent.mkdir(parents=True, exist_ok=True)
+    parts = []
+    for i, cell in enumerate(json.loads(path.read_text())["cells"]):
+        text = "".join(cell["source"])
+        parts.append(text if cell["cell_type"] == "markdown" else f"```python\n{text}\n```")
+        for k, output in enumerate(cell.get("outputs", ())):
+            data = output.get("data", {})
+            if "image/png" in data:
+                picture = target.with_name(f"{target.stem}_{i}_{k}.png")
+                picture.write_bytes(base64.b64decode("".join(data["image/png"])))
+                parts.append(f"![What the cell above draws]({picture.name})")
+            elif "text" in output or "text/plain" in data:
+                parts.append(f"```text\n{''.join(output.get('text', data.get('text/plain', '')))}\n```")
+    target.write_text("\n\n".join(parts) + "\n")
 
 
 def _append_menus(source: Path) -> None:
