@@ -2,7 +2,7 @@
 # see .ci/setup.sh for what is looked for and what is installed.
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all fuzz tasks mutants gpu-static bench results architecture options lint clean ready ready-dev
+.PHONY: help demo test test-all fuzz tasks mutants gpu-static bench results architecture options site lint clean ready ready-dev
 
 # Tests start hundreds of processes: each would compile the package again where bytecode is not kept.
 export PYTHONDONTWRITEBYTECODE :=
@@ -51,6 +51,10 @@ architecture: ready  ## the drawing and the table of docs/developers/architectur
 
 options: ready  ## type stubs, page and flags of the verbs' options, from their records
 	@.venv/bin/python docs/developers/write_options.py
+
+site:  ## the documentation as a site: out/site/html/index.html; warnings are errors
+	@PYTHON='$(PYTHON)' sh .ci/setup.sh site site
+	@.venv/bin/python docs/site/build.py
 
 lint: ready-dev  ## style, format, types, and imports that point down
 	@status=0; for tool in "ruff check $(CODE)" "ruff format --check $(CODE)" mypy; do \

@@ -2,7 +2,7 @@
 # Make this checkout ready to run: a virtual environment in .venv, the package in it (editable),
 # and an OpenCL device that can build a kernel. POSIX sh; `make demo` and `make test` call it.
 #
-#   .ci/setup.sh [EXTRA] [GOAL]     EXTRA: test (default), dev or gpu-static; GOAL: the make goal to name in messages
+#   .ci/setup.sh [EXTRA] [GOAL]     EXTRA: test (default), dev, site or gpu-static; GOAL: the make goal to name in messages
 #   PYTHON=/path/to/python3.12      the Python to build .venv from (3.11 or newer)
 #
 # A second run only looks. When it cannot go on it says in one paragraph what is missing and the
@@ -301,8 +301,8 @@ need_compilers() {
 # ---------------------------------------------------------------- go
 
 case $extra in
-    test | dev | gpu-static) ;;
-    *) echo "'$extra' is no extra of this package: test, dev or gpu-static" | stop 1 ;;
+    test | dev | site | gpu-static) ;;
+    *) echo "'$extra' is no extra of this package: test, dev, site or gpu-static" | stop 1 ;;
 esac
 
 # Two runs at once (make demo beside make test) take turns; the lock is this file, so nothing is left behind.
@@ -313,4 +313,8 @@ if command -v flock >/dev/null 2>&1 && ! flock -n 9; then
 fi
 
 ready || install_package
-if [ "$extra" = gpu-static ]; then need_compilers; else need_device; fi
+case $extra in
+    gpu-static) need_compilers ;;
+    site) ;; # pages are written without a device
+    *) need_device ;;
+esac

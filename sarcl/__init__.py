@@ -13,6 +13,17 @@ Two equations carry everything::
     v_p      1 inside the range window        |tau - tau_ref| <= 1/(2 frequency_step)
     I        data                             Image
 
+Examples of the docstrings continue from these lines:
+
+    >>> import numpy as np
+    >>> import sarcl
+    >>> chirp = sarcl.Waveform.chirp(center=9.6e9, bandwidth=300e6, duration=1e-6)  # Hz, s
+    >>> track = sarcl.Trajectory.circle(radius=5e3, height=5e3, arc=0.05, n_pulses=64, speed=100)  # m, rad, m/s
+    >>> scene = sarcl.Scene.points([[0, 0, 0], [5, -4, 0]])  # m
+    >>> raw = sarcl.echo(scene, chirp, track)
+    >>> grid = sarcl.ImageGrid.plane(shape=(128, 128), spacing=0.25)  # rows, columns; m
+    >>> image = sarcl.backproject(raw, grid)
+
 Public names, with the file that defines each: sarcl/__init__.pyi. Rooms and the direction of their imports:
 docs/developers/architecture.md.
 """

@@ -68,6 +68,12 @@ class PointResponse:
     gain      the image's gain at the nearest pixel: |peak/gain|^2 is the point's radar cross section, m^2
     reach     IRW on each side that pslr and islr cover: 10, or as far as the image extends
     cuts      the cuts in range and cross-range from which the figures are taken
+
+    >>> point = sarcl.measure(image, near=(0, 0, 0))
+    >>> [round(width, 2) for width in point.irw]  # m, range and cross-range
+    [0.63, 0.39]
+    >>> round(point.rcs, 2)  # m^2
+    1.0
     """
 
     position: NDArray[np.float64]
@@ -151,6 +157,10 @@ def measure(image: Image, near: ArrayLike | None = None) -> PointResponse | tupl
     response of a stronger one, and a grid coarser than the resolution: one on which the response fills more
     than +-0.42 of the +-0.5 cycles per pixel.
     Source: the image equation of sarcl/__init__.py for the carrier; the figures are those of sin(x)/x.
+
+    >>> first, second = sarcl.measure(image, near=[[0, 0, 0], [5, -4, 0]])
+    >>> second.position.round(2)
+    array([ 5., -4.,  0.])
     """
     validation.instance("image", image, Image)
     _check(image)

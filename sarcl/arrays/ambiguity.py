@@ -16,7 +16,12 @@ MOST_BYTES = 4e9  # largest size of an ambiguity function
 
 @dataclass(frozen=True, eq=False)
 class Ambiguity:
-    """|chi| (n_delays, n_dopplers), 1 at the origin, at evenly spaced, increasing delays, s, and Doppler shifts, Hz."""
+    """|chi| (n_delays, n_dopplers), 1 at the origin, at evenly spaced, increasing delays, s, and Doppler shifts, Hz.
+
+    >>> chi = sarcl.ambiguity(np.ones(64), rate=64e6)
+    >>> chi.magnitude.shape, round(float(chi.volume), 3)
+    ((127, 128), 1.0)
+    """
 
     delays: NDArray[np.float64]
     dopplers: NDArray[np.float64]
@@ -43,6 +48,11 @@ def ambiguity(
     max_doppler  Hz, largest |Doppler shift| that is returned; None: half the rate, which must be high enough for that
 
     A chirp of rate K has its ridge along nu = + K tau. Source: Farooq 2009, equations 4.22, 4.23 (without the square).
+
+    >>> times = np.arange(-128, 128) / 256e6
+    >>> chi = sarcl.ambiguity(np.exp(1j * np.pi * 100e12 * times**2), rate=256e6, max_delay=5e-8)
+    >>> chi.magnitude.shape
+    (25, 512)
     """
     from scipy import fft
 

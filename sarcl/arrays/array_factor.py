@@ -42,7 +42,11 @@ def reduced(x: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
 
 
 def dirichlet(x: ArrayLike, n: int) -> np.ndarray:
-    """sin(n x/2)/sin(x/2), n where x is 0; x rad (...), |x| <= 6e6. The error is below 1e-12 n."""
+    """sin(n x/2)/sin(x/2), n where x is 0; x rad (...), |x| <= 6e6. The error is below 1e-12 n.
+
+    >>> sarcl.array_factor.dirichlet([0.0, 2 * np.pi], 5)
+    array([5., 5.])
+    """
     n = validation.count("n", n)
     rest, cycles = reduced(x)
     flat = np.abs(rest) < 1e-300  # half of a smaller number may underflow to 0
@@ -61,7 +65,12 @@ def geometric(x: ArrayLike, n: int) -> np.ndarray:
 def constant_factor(
     f0: float, *, shape: Sequence[int] | np.ndarray, spacing: ArrayLike, cosines: Cosines
 ) -> np.ndarray:
-    """Array factor of N by P elements on one carrier, (3.23). cosines (ky, kz), each (...)."""
+    """Array factor of N by P elements on one carrier, (3.23). cosines (ky, kz), each (...).
+
+    >>> factor = sarcl.array_factor.constant_factor(10e9, shape=(8, 1), spacing=(0.015, 0), cosines=(0.0, 0.0))
+    >>> float(abs(factor))
+    8.0
+    """
     return diverse_factor(f0, shape=shape, spacing=spacing, frequency_step=(0, 0), cosines=cosines, retarded=0.0)
 
 
@@ -77,6 +86,13 @@ def diverse_factor(
     """Array factor of N by P elements, (3.46), in closed form: valid where `quadratic_phase` is small.
 
     shape (N, P), spacing (dy, dz) m, frequency_step (dfy, dfz) Hz, cosines (ky, kz) and retarded s: (...), broadcast.
+
+    >>> steps, times = (20e6, 0), [0, 1 / 160e6]  # Hz, s
+    >>> factor = sarcl.array_factor.diverse_factor(
+    ...     10e9, shape=(8, 1), spacing=(0.015, 0), frequency_step=steps, cosines=(0.0, 0.0), retarded=times
+    ... )
+    >>> abs(factor).round(6)
+    array([8., 0.])
     """
     f0 = validation.carrier("f0", f0)
     d = validation.array("spacing", spacing, np.float64, (2,))
@@ -104,7 +120,11 @@ def _pair(name: str, value: object) -> None:
 
 
 def power_pattern(factor: ArrayLike, peak: float | None = None) -> np.ndarray:
-    """|factor|^2 over `peak`^2; peak: the number of elements, or None: the largest |factor| given."""
+    """|factor|^2 over `peak`^2; peak: the number of elements, or None: the largest |factor| given.
+
+    >>> sarcl.array_factor.power_pattern([8, 4, 0])
+    array([1.  , 0.25, 0.  ])
+    """
     level = np.abs(validation.values("factor", factor, np.complex128))
     validation.finite("factor", level)
     largest = float(level.max(initial=0)) if peak is None else validation.number("peak", peak, above=0)
@@ -136,6 +156,10 @@ def quadratic_phase(
 
     Farooq accepts up to pi/4. Cosines of 1 give (3.40); (1, 0) is the plane of azimuth alone, (3.59). Moduli are summed
     because steps of opposite signs cancel at the corner (N, P), which the paper considers, but not elsewhere.
+
+    >>> phase = sarcl.array_factor.quadratic_phase(shape=(45, 1), spacing=(0.015, 0), frequency_step=(1e6, 0))
+    >>> phase < np.pi / 4
+    True
     """
     _pair("shape", shape)
     n, p = (validation.count(f"shape[{i}]", shape[i]) for i in range(2))
@@ -154,6 +178,12 @@ def beam_angles(
 
     sin(elevation) = (c/(f0 dz)) (v - dfz t');  sin(azimuth) cos(elevation) = (c/(f0 dy)) (u - dfy t');  lobe (u, v).
     Along y alone: sin(azimuth) = -(c/(f0 d)) df t'. Farooq's layout, -n d, has the opposite signs.
+
+    >>> azimuth, elevation = sarcl.array_factor.beam_angles(
+    ...     10e9, spacing=(0.015, 0.015), frequency_step=(20e6, 0), retarded=5e-9
+    ... )
+    >>> round(float(azimuth), 3), float(elevation)
+    (-0.201, 0.0)
     """
     f0 = validation.number("f0", f0, above=0)
     wave = SPEED_OF_LIGHT / f0
@@ -174,27 +204,47 @@ def beam_angles(
 
 
 def period(frequency_step: float) -> float:
-    """1/|df|, s: a pulse of this length holds one peak, (4.15)."""
+    """1/|df|, s: a pulse of this length holds one peak, (4.15).
+
+    >>> 1e9 * sarcl.array_factor.period(20e6)  # ns
+    50.0
+    """
     return 1 / abs(_step(frequency_step))
 
 
 def main_lobe(n: int, frequency_step: float) -> float:
-    """2/(n |df|), s between the nulls beside the peak, (4.14)."""
+    """2/(n |df|), s between the nulls beside the peak, (4.14).
+
+    >>> 1e9 * sarcl.array_factor.main_lobe(50, 20e6)  # ns
+    2.0
+    """
     return 2 / (validation.count("n", n) * abs(_step(frequency_step)))
 
 
 def bandwidth(n: int, frequency_step: float) -> float:
-    """n |df|, Hz, of n pulses of length 1/|df|, (4.18)."""
+    """n |df|, Hz, of n pulses of length 1/|df|, (4.18).
+
+    >>> sarcl.array_factor.bandwidth(45, 20e6)
+    900000000.0
+    """
     return validation.count("n", n) * abs(_step(frequency_step))
 
 
 def time_bandwidth(n: int, frequency_step: float) -> float:
-    """bandwidth times period: n, (4.19)."""
+    """bandwidth times period: n, (4.19).
+
+    >>> sarcl.array_factor.time_bandwidth(45, 20e6)
+    45.0
+    """
     return bandwidth(n, frequency_step) * period(frequency_step)
 
 
 def center_frequency(f0: float, n: int, frequency_step: float) -> float:
-    """f0 + (n - 1) df/2, Hz, (4.6)."""
+    """f0 + (n - 1) df/2, Hz, (4.6).
+
+    >>> sarcl.array_factor.center_frequency(10e9, 45, 20e6)
+    10440000000.0
+    """
     return validation.number("f0", f0) + (validation.count("n", n) - 1) / 2 * validation.number(
         "frequency_step", frequency_step
     )
@@ -207,6 +257,10 @@ def peak_delay(
 
     n = 1: f = f0, the peak of the closed form, (4.27), which has the other sign for its elements at -n d.
     n elements: f = f0 + (n - 1) df, the peak of the exact field: the part i (n - 1) of its phase i^2 dk d k is linear.
+
+    >>> delay = sarcl.array_factor.peak_delay(10e9, spacing=0.015, frequency_step=20e6, azimuth=0.1)
+    >>> round(1e9 * float(delay), 2)  # ns
+    -2.5
     """
     f = validation.number("f0", f0, above=0) + (validation.count("n", n) - 1) * _step(frequency_step)
     d, step = validation.number("spacing", spacing), _step(frequency_step)
@@ -224,7 +278,13 @@ def waveform(
     retarded: ArrayLike,
     pulsed: bool = False,
 ) -> np.ndarray:
-    """exp(j 2 pi f0 t') times the factor of n elements in a row, (4.9); pulsed: 0 where |t'| > period/2, (4.16)."""
+    """exp(j 2 pi f0 t') times the factor of n elements in a row, (4.9); pulsed: 0 where |t'| > period/2, (4.16).
+
+    >>> times = [0.0, 3e-9]  # s
+    >>> pulse = sarcl.array_factor.waveform(10e9, 8, spacing=0.015, frequency_step=20e6, azimuth=0.0, retarded=times)
+    >>> abs(pulse).round(3)
+    array([8.   , 5.326])
+    """
     t = _seconds(retarded)
     aside = np.sin(_finite("azimuth", azimuth))
     steps = (validation.number("frequency_step", frequency_step), 0.0)

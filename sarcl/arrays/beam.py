@@ -45,6 +45,11 @@ def beam(
     Distances to every element are exact, the phase is absolute, and amplitudes do not fall with range. The field of an
     array with one carrier is computed once per point. Raises ValueError for invalid arguments, ToleranceUnreachable
     with the best tolerance, and MemoryError if max_bytes is too small for one tile.
+
+    >>> array = sarcl.AntennaArray.linear(8, spacing=0.015)
+    >>> field = sarcl.beam(array, 10e9, times=[0.0], positions=[[1e4, 0, 0], [1e4, 1e3, 0]])
+    >>> field.shape, round(float(abs(field[0, 0])), 3)
+    ((1, 2), 8.0)
     """
     validation.instance("array", array, AntennaArray)
     f0 = validation.number("f0", f0)

@@ -54,6 +54,13 @@ def map_aperture(
 
     Raises ValueError without an array, for channels that are separate already, share samples or lie outside the sampled
     band, for elements or carriers that are not evenly spaced, and for a center other than that of the data.
+
+    >>> array = sarcl.AntennaArray.linear(8, spacing=0.015, frequency_step=10e6)
+    >>> tone = sarcl.Waveform.tone(center=10e9, duration=1 / 10e6)
+    >>> flight = sarcl.Trajectory.line(start=(-3e3, -50, 4e3), velocity=(0, 100, 0), prf=64, n_pulses=64)
+    >>> summed = sarcl.echo(scene, tone, flight, array=array, reference=(0, 0, 0))
+    >>> sarcl.map_aperture(summed, "apparent").n_rows
+    64
     """
     validation.instance("raw", raw, PhaseHistory)
     validation.choice("mapping", mapping, MAPPINGS)

@@ -32,7 +32,13 @@ _COUNTS: ContextVar[dict[str, tuple[str, int]] | None] = ContextVar("counts", de
 
 
 class SarclWarning(UserWarning):
-    """A warning about a result that is correct as it is."""
+    """A warning about a result that is correct as it is.
+
+    >>> import warnings
+    >>> with warnings.catch_warnings():
+    ...     warnings.simplefilter("error", sarcl.SarclWarning)  # an error, for a script that must not go on
+    ...     image = sarcl.backproject(raw, grid)
+    """
 
 
 @contextmanager
@@ -97,6 +103,11 @@ class ToleranceMissed(ValueError):
     raws                 of a list of tracks the finished PhaseHistories of all
     predicted            relative error that the error formulas predicted, None: unknown
     instead              what to do where a smaller tolerance may not help
+
+    >>> try:
+    ...     image = sarcl.backproject(raw, grid, tolerance=1e-3, check=True)
+    ... except sarcl.ToleranceMissed as missed:
+    ...     image = missed.image
     """
 
     def __init__(
@@ -163,6 +174,11 @@ class ToleranceUnreachable(ValueError):
     limit   the term that limits the error, such as "float32 range profiles"
     remedy  what to do: pass the best tolerance, where nothing else is known to help
     how     what cannot meet the tolerance, in words, such as "in complex64"; default: the limit
+
+    >>> try:
+    ...     sarcl.echo(scene, chirp, track, tolerance=1e-9)
+    ... except sarcl.ToleranceUnreachable as refusal:
+    ...     samples = sarcl.echo(scene, chirp, track, tolerance=refusal.best).samples
     """
 
     def __init__(self, asked: float, best: float | None, limit: str, remedy: str = "", how: str = "") -> None:

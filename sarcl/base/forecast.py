@@ -34,6 +34,10 @@ class Forecast(NotebookTable, Generic[R_co]):
     run              run() carries out this very plan and returns the verb's result. What was planned from is referred
                      to, not copied: ValueError where a file of it has changed meanwhile
     search_cheaper   gives `cheaper`
+
+    >>> forecast = sarcl.plan(raw, grid, tolerance=1e-2)
+    >>> forecast.predicted_error <= 1e-2, forecast.run().shape
+    (True, (128, 128))
     """
 
     method: str

@@ -29,7 +29,11 @@ class Option:
 
 def option(default: object, doc: str = "", check: Check | None = None, *, in_files: bool = True) -> Any:
     """The field of an option. Where the record inherits the option, `doc` and `check` may be left out: those of the
-    nearest base count."""
+    nearest base count.
+
+    >>> sarcl.option(4, "number of parts of the track").default
+    4
+    """
     return field(default=default, metadata={_KEY: Option(inspect.cleandoc(doc), check, in_files)})
 
 
@@ -43,6 +47,13 @@ class Options:
     """Base class of records of options: checks every field, in their order, when one is made.
 
     absent  options of other verbs that this one has not, and why: what an error says
+
+    >>> from dataclasses import dataclass
+    >>> @dataclass(frozen=True, eq=False, kw_only=True)
+    ... class LookOptions(sarcl.Options):
+    ...     looks: int = sarcl.option(4, "number of parts of the track")
+    >>> LookOptions().looks
+    4
     """
 
     absent: ClassVar[Mapping[str, str]] = {}

@@ -21,6 +21,8 @@ class Bar:
     stage ends and when the `with` block ends, however it ends. A lost terminal does not stop the work.
 
     stream  where the line is drawn if it is a terminal; None: sys.stderr
+
+    >>> raw = sarcl.echo(scene, chirp, track, progress=sarcl.progress.Bar())
     """
 
     def __init__(self, stream: TextIO | None = None) -> None:

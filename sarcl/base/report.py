@@ -57,6 +57,9 @@ class Report(NotebookTable):
     model_error            predicted relative L2 error of the model itself, which no tolerance bounds: of the grid of
                            `fullwave_echo`; None where the model has no error of its own, or none was predicted
     error_terms            parts of predicted_error, which is the root of the sum of their squares
+
+    >>> image.report.predicted_error <= image.report.tolerance, image.report.contributions_done
+    (True, 1048576)
     """
 
     plan: Mapping[str, object] = field(default_factory=dict)

@@ -52,6 +52,15 @@ def verb(
 
     lists      a subject that may be a list, and options that are lists of as many then
     plan_list  plan_list(plan, *subjects, options) plans such a list
+
+    >>> class Count:  # a plan; forecast() of one returns a sarcl.Forecast
+    ...     def __init__(self, rows): self.rows = rows
+    ...     def run(self): return self.rows
+    >>> @sarcl.verb(sarcl.Options)
+    ... def count(raw, options):
+    ...     return Count(raw.n_rows)
+    >>> count(raw)
+    64
     """
 
     def decorate(plan: Callable[..., Plan[R]]) -> Verb[R]:
@@ -96,7 +105,7 @@ def result_of(annotation: str) -> str:
 def listed(record: type[Options]) -> str:
     """The options of a record, one below the other, as the docstring of its verb has them."""
     texts = {name: details.doc for name, (_, details) in described(record).items()}
-    column = max(len(name) for name in texts if len(name) <= 13) + 2
+    column = max((len(name) for name in texts if len(name) <= 13), default=0) + 2
     lines = []
     for name, text in texts.items():
         lines += textwrap.wrap(

@@ -26,6 +26,9 @@ def ecef(longitude: ArrayLike, latitude: ArrayLike, height: ArrayLike) -> Floats
     """Earth-centred, Earth-fixed positions, m (..., 3), of degrees and heights above the ellipsoid, m.
 
     Source: NGA.STND.0036 (WGS84), eq. (4-14): x = (N + h) cos(lat) cos(lon), ..., z = (N (1 - e^2) + h) sin(lat).
+
+    >>> sarcl.wgs84.ecef(0.0, 0.0, 100.0)
+    array([6378237.,       0.,       0.])
     """
     longitude, latitude = _radians(longitude, latitude)
     height = validation.values("height", height)
@@ -39,7 +42,11 @@ def ecef(longitude: ArrayLike, latitude: ArrayLike, height: ArrayLike) -> Floats
 
 
 def up(longitude: ArrayLike, latitude: ArrayLike) -> Floats:
-    """Unit normal of the ellipsoid, outwards (..., 3), at degrees."""
+    """Unit normal of the ellipsoid, outwards (..., 3), at degrees.
+
+    >>> np.allclose(sarcl.wgs84.up(0.0, 90.0), (0, 0, 1))
+    True
+    """
     longitude, latitude = _radians(longitude, latitude)
     with np.errstate(invalid="ignore"):  # infinite angles have no normal: NaN, as of NaN
         c = np.cos(latitude)
@@ -47,7 +54,12 @@ def up(longitude: ArrayLike, latitude: ArrayLike) -> Floats:
 
 
 def local_axes(longitude: float, latitude: float) -> Floats:
-    """Rows east, north, up (3, 3) in Earth-centred coordinates: local = axes @ (position - origin)."""
+    """Rows east, north, up (3, 3) in Earth-centred coordinates: local = axes @ (position - origin).
+
+    >>> east, north, up = sarcl.wgs84.local_axes(90.0, 0.0)
+    >>> np.allclose(up, (0, 1, 0))
+    True
+    """
     lon, lat = (
         np.radians(validation.number("longitude", longitude)),
         np.radians(validation.number("latitude", latitude)),
@@ -77,6 +89,9 @@ def geodetic(positions: ArrayLike) -> tuple[Floats, Floats, Floats]:
     the ellipsoid have their normal through a position: the nearest is taken, and the northern one of two that are
     equally near. The longitude on the axis is 0.
     Source: C. F. F. Karney, Geodesics on an ellipsoid of revolution, arXiv:1102.1215, appendix B.
+
+    >>> [float(value) for value in sarcl.wgs84.geodetic([6378237.0, 0, 0])]
+    [0.0, 0.0, 100.0]
     """
     x, y, z = np.moveaxis(validation.vectors("positions", positions), -1, 0)
     e2, e4, rest = ECCENTRICITY_SQUARED, ECCENTRICITY_SQUARED**2, 1 - ECCENTRICITY_SQUARED

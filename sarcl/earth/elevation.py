@@ -35,6 +35,10 @@ class ElevationModel:
     there, and may cover a pole. Where the columns go around the Earth, the first follows the last. Raises ValueError
     for shapes that disagree, axes that go back or jump by 180 degrees, folded grids, and heights that are infinite, all
     NaN, or beyond +-20 km. `read` takes files.
+
+    >>> model = sarcl.ElevationModel([7.0, 7.1, 7.2], [46.0, 46.1], [[500, 600, 700], [600, 700, 800]])
+    >>> round(float(model.heights_at(7.05, 46.05)), 3)
+    600.0
     """
 
     longitude: Floats

@@ -48,6 +48,10 @@ def perturbed(
     The errors are sums of 256 cosines of random phase, with frequencies drawn from the spectrum (Shinozuka and
     Deodatis, Appl. Mech. Rev. 44, 1991). The deviation is that of the ensemble: errors that change slowly over the
     track are mostly a constant offset.
+
+    >>> flown = sarcl.motion.perturbed(track, rms=0.01, correlation_time=0.2, seed=3)
+    >>> bool(abs(flown.positions - track.positions).max() < 0.06)
+    True
     """
     validation.instance("track", track, Trajectory)
     seed = validation.count("seed", seed, 0)
@@ -70,6 +74,10 @@ def sinusoidal(
     """The track moved by amplitude sin(2 pi frequency t + phase): m (3,), Hz, rad, one or per axis.
 
     A motion of amplitude a along the line of sight causes paired echoes of amplitude J_1(4 pi a/lambda) beside a point.
+
+    >>> flown = sarcl.motion.sinusoidal(track, amplitude=(0, 0, 0.02), frequency=2.0)
+    >>> bool(abs(flown.positions - track.positions).max() <= 0.02)
+    True
     """
     validation.instance("track", track, Trajectory)
     size = validation.array("amplitude", amplitude, np.float64, (3,))
@@ -87,6 +95,11 @@ def with_positions(raw: PhaseHistory, track: Trajectory, *, receiver: Trajectory
     it has times (rows of one time, such as polarisations, share a position). receiver: likewise; default
     the track where raw has one antenna, raw's own receiver where it has two. A track of `Orbit.trajectory` gives both
     antennas, at the delays of the reference ranges. ValueError where times do not match.
+
+    >>> flown = sarcl.motion.perturbed(track, rms=0.01, correlation_time=0.2)
+    >>> assumed = sarcl.motion.with_positions(sarcl.echo(scene, chirp, flown), track)
+    >>> bool(np.array_equal(assumed.tx, track.positions))
+    True
     """
     validation.instance("raw", raw, PhaseHistory)
     validation.instance("track", track, Trajectory)
@@ -122,6 +135,9 @@ def relative(
     velocity m/s, acceleration m/s^2, rotation rad/s about `center` c, m: each (3,). Distances, incidence and beams are
     exact, pulse by pulse. Polarisation is exact unless the body rotates about another axis than the vertical that
     defines H and V. Shadows between the body and the rest of the scene are not modelled. Add echoes with `combined`.
+
+    >>> moving = sarcl.motion.relative(track, velocity=(3.0, 0, 0))
+    >>> raw = sarcl.echo(scene, chirp, moving, range_window=(-40, 40))
     """
     validation.instance("track", track, Trajectory)
     from scipy.spatial.transform import Rotation
@@ -157,6 +173,10 @@ def combined(parts: Sequence[PhaseHistory]) -> PhaseHistory:
     The phases of the other parts are changed from their reference ranges to those of the first. Parts need the same
     rows, frequencies and polarisations: give `sarcl.echo` the same range_window for all, wide enough for the true
     ranges of each part. ValueError names what differs, or the row where a part lies outside the window of the first.
+
+    >>> moving = sarcl.motion.relative(track, velocity=(3.0, 0, 0))
+    >>> parts = [sarcl.echo(scene, chirp, seen, range_window=(-40, 40)) for seen in (track, moving)]
+    >>> both = sarcl.motion.combined(parts)
     """
     if isinstance(parts, PhaseHistory) or not isinstance(parts, Iterable):
         raise TypeError(f"parts is a {type(parts).__name__}; give a list of phase histories")

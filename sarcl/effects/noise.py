@@ -50,6 +50,9 @@ def add_noise(
     by the same factor, so the NESZ holds for all of them. Noise is filtered as the echoes are: it has the spectrum
     |P(f)| where the rows are compressed and their waveform is known. ValueError says what is missing.
     Source: docs/theory/radar.md.
+
+    >>> noisy = sarcl.add_noise(raw, nesz_db=-20, grid=grid, seed=1)
+    >>> empty = sarcl.backproject(noisy, grid).data[:40]  # far from both points
     """
     instance("raw", raw, PhaseHistory)
     seed = count("seed", seed, 0)
@@ -124,6 +127,9 @@ def cell_area(raw: PhaseHistory, point: ArrayLike, normal: ArrayLike = (0.0, 0.0
     range cell on the ground times cross-range cell, both between peak and null of an unweighted image: c/(2 B sin) x
     lambda/(2 angle), where the track is straight and short. Only rows of the first polarisation count; they must pass
     the point in one direction.
+
+    >>> round(sarcl.noise.cell_area(raw, (0, 0, 0)), 2)
+    0.31
     """
     instance("raw", raw, PhaseHistory)
     return float(_density(raw, point, normal) / (_one_image(raw).sum() * raw.n_samples))

@@ -61,6 +61,11 @@ def stop_and_go_error(
     flight: c tau = |T(t) - x| + |x - R(t + tau)| is solved. chirp: the echo of p(t) is p((t - tau)/(1 + tau')), whose
     spectrum is P(f (1 + tau')). For a chirp of rate k = waveform.sweep_rate, P = exp(-j pi (f - fc)^2/k), that is
     an additional delay of tau' fc/k, and little else (docs/theory/radar.md). ValueError for pulses that are not chirps.
+
+    >>> flight = sarcl.Trajectory.line(start=(-5e3, -50, 4e3), velocity=(0, 100, 0), prf=100, n_pulses=101)
+    >>> error = sarcl.stop_and_go.stop_and_go_error(flight, [[0, 0, 0]], chirp)
+    >>> round(float(abs(error.phase).max()), 4)  # rad
+    0.0067
     """
     validation.instance("track", track, Trajectory)
     validation.instance("waveform", waveform, Waveform)
@@ -94,6 +99,11 @@ def receiver_at_arrival(track: Trajectory, point: ArrayLike, *, receiver: Trajec
     sarcl.echo(scene, chirp, track, receiver=receiver_at_arrival(track, center)) has the true two-way path of the point
     `center`; `stop_and_go_error(..., used=...)` gives its error elsewhere. The frame must be inertial: on the rotating
     Earth, give positions in a frame that does not rotate (the Sagnac effect is of the same size).
+
+    >>> flight = sarcl.Trajectory.line(start=(-5e3, -50, 4e3), velocity=(0, 100, 0), prf=100, n_pulses=101)
+    >>> later = sarcl.stop_and_go.receiver_at_arrival(flight, (0, 0, 0))
+    >>> round(float(later.positions[50, 1] - flight.positions[50, 1]), 4)  # m
+    0.0043
     """
     validation.instance("track", track, Trajectory)
     if receiver is not None:

@@ -62,6 +62,10 @@ def backproject(raw: PhaseHistory, grid: ImageGrid, options: BackprojectOptions)
     image: the check measured an error above the tolerance. MemoryError: max_bytes too small for a single row.
     SarclWarning: 1 % of the pixels or more lie outside the range window of every row; report.plan counts them.
     Source: Farooq 2009, section 2.2.2; docs/theory/accuracy.md and docs/guide/large_images.md.
+
+    >>> image = sarcl.backproject(raw, grid, tolerance=1e-3, window=("taylor", 35, 5))
+    >>> bool(np.allclose(sarcl.measure(image, near=(0, 0, 0)).position, 0, atol=0.01))
+    True
     """
     return plan_of(raw, grid, options)
 

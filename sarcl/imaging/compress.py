@@ -22,6 +22,10 @@ def compress(raw: PhaseHistory, waveform: Waveform | None = None) -> PhaseHistor
     waveform  default raw.waveform. ValueError where there is none: data of an unknown pulse cannot be compressed.
     SarclWarning where the result has less contrast than noise would, or half of what the filter of a chirp of the other
     sign gives: the pulse that was sent is another one.
+
+    >>> received = sarcl.echo(scene, chirp, track, compressed=False)
+    >>> sarcl.compress(received).compressed
+    True
     """
     instance("raw", raw, PhaseHistory)
     if waveform is not None and not isinstance(waveform, Waveform):

@@ -62,6 +62,9 @@ def default_grid(
     ellipsoid at its center, and columns run east.
     The reasons for the choice are logged (INFO). TypeError where raw is no PhaseHistory; ValueError for echoes without
     rows, and for Earth-fixed ones without side and center.
+
+    >>> sarcl.default_grid(raw).spacing
+    (0.1926, 0.3011)
     """
     instance("raw", raw, PhaseHistory)
     chosen = choose_grid(raw, center=center, shape=shape, spacing=spacing, side=side, heights=heights)

@@ -26,6 +26,10 @@ class EffectiveVelocity(NamedTuple):
     """The straight track that sees a point as the true one does.
 
     speed  m/s;  time  s, of the closest approach;  range  m, there;  residual  m, largest error of the hyperbola
+
+    >>> straight = sarcl.Trajectory.line(start=(-5e3, -50, 4e3), velocity=(0, 100, 0), prf=100, n_pulses=101)
+    >>> round(sarcl.effective_velocity(straight, (0, 0, 0)).speed, 3)
+    100.0
     """
 
     speed: float
@@ -40,6 +44,11 @@ def effective_velocity(track: Trajectory, point: ArrayLike) -> EffectiveVelocity
     R(t)^2 = range^2 + speed^2 (t - time)^2, fitted over all pulses by least squares. Take pulses about the closest
     approach, as many as an aperture has. ValueError: fewer than 3 pulses, a track without times, or one whose range
     does not grow on both sides of a closest approach.
+
+    >>> orbit = sarcl.Orbit.kepler(semi_major_axis=7.07e6, eccentricity=0, inclination=1.71)
+    >>> pulses = orbit.trajectory(center=0.0, prf=500, n_pulses=501)
+    >>> round(sarcl.effective_velocity(pulses, orbit.geolocate(0.0, 900e3, heights=0.0)).speed)
+    7203
     """
     instance("track", track, Trajectory)
     x = array("point", point, np.float64, (3,))
@@ -77,6 +86,10 @@ def doppler_centroid(raw: PhaseHistory, *, near: float = 0.0) -> float:
     From the phase between neighbouring rows, summed over all samples. ValueError: no times, one row, uneven times,
     several channels (a time occurs twice), or echoes that are zero.
     Source: Madsen, IEEE Trans. AES-25, 1989, pp. 134-140.
+
+    >>> flight = sarcl.Trajectory.line(start=(-5e3, -950, 4e3), velocity=(0, 100, 0), prf=500, n_pulses=100)
+    >>> round(sarcl.doppler_centroid(sarcl.echo(scene, chirp, flight), near=900))
+    928
     """
     instance("raw", raw, PhaseHistory)
     near = number("near", near)

@@ -115,6 +115,11 @@ class Echoes(_Named):
     TypeError, ValueError: arguments that do not fit, naming them. ToleranceUnreachable, a ValueError: the tolerance
     cannot be met. An operator cannot be pickled, and a process that was forked cannot use it: make it there.
     Source: Farooq 2009, sections 2.2.2 and 2.3; docs/theory/linear.md.
+
+    >>> operator = sarcl.linear.Echoes(grid, raw)
+    >>> pixels = operator.H @ raw.samples.ravel()
+    >>> np.allclose(pixels.reshape(grid.shape), image.data, atol=1e-2 * image.gain)
+    True
     """
 
     def __init__(

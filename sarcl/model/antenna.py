@@ -41,6 +41,10 @@ class Antenna:
     mount       rotation from antenna to body axes (3, 3): attitude @ mount is that from antenna to scene axes
 
     ValueError names the wrong argument. The gain of an aperture is 0 behind it, that of a table outside its angles.
+
+    >>> dish = sarcl.Antenna.gaussian(width=(0.02, 0.02), gain_db=38)
+    >>> round(float(20 * np.log10(abs(dish.gain([1, 0.01, 0], frequency=9.6e9)))), 2)  # half its width off the axis, dB
+    34.99
     """
 
     kind: Kind

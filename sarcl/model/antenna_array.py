@@ -28,6 +28,10 @@ class AntennaArray:
     Elements may coincide. A field is sum_n w_n exp(+j 2 pi f_n (t - r_n/c)), f_n = f0 + offset (`sarcl.beam`).
     Farooq's array (2009, equation 3.1) lies along (0, -1, 0) and (0, 0, -1), which reverses the sign of angles.
     Raises ValueError for other shapes, more than 10 000 elements, weights that are all zero, NaN or Inf.
+
+    >>> array = sarcl.AntennaArray.linear(8, spacing=0.015, frequency_step=20e6)
+    >>> array.n, array.offsets_at(0)[:3] / 1e6
+    (8, array([ 0., 20., 40.]))
     """
 
     positions: NDArray[np.float64]

@@ -22,6 +22,10 @@ def concatenate(parts: Sequence[PhaseHistory]) -> PhaseHistory:
     Optional fields per row, the waveform, image area and metadata are kept where every part has them; lazy samples stay
     lazy.
     ValueError names the part that differs.
+
+    >>> both = sarcl.concatenate([raw, sarcl.echo(scene, chirp, track, polarization="VV")])
+    >>> both.n_rows, both.select(polarization="VV").n_rows
+    (128, 64)
     """
     if isinstance(parts, PhaseHistory):
         raise TypeError("concatenate takes a list of phase histories, got one; give [raw, ...]")

@@ -55,6 +55,10 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
                   half path of the range window, m; weight. What saw a position follows from them (`sarcl.measure`)
     metadata      XML of the SICD file that it was read from
     frame         of positions: "earth-fixed" where the grid lies within 32 km of the ellipsoid, or "local"
+
+    >>> image.shape, round(float(abs(image[64, 64]) / image.gain), 2)
+    ((128, 128), 1.0)
+    >>> image.save("points.png", floor_db=-40)
     """
 
     data: Any

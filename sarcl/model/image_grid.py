@@ -36,6 +36,10 @@ class ImageGrid:
              the points; else None
     crs, map_axes  of `on_map`: coordinate reference system, and x and y of pixel [0, 0] with the steps from column to
              column and from row to row, in its units (4,); else None
+
+    >>> grid = sarcl.ImageGrid.plane(center=(0, 0, 2), shape=(3, 5), spacing=0.5)
+    >>> grid.positions.shape, grid.positions[1, 2]
+    ((3, 5, 3), array([0., 0., 2.]))
     """
 
     shape: tuple[int, ...]

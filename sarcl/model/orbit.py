@@ -36,6 +36,11 @@ class Orbit:
     epoch  UTC of time 0, or None where it is unknown
 
     Times are seconds since the epoch, where a day has 86 400 s.
+
+    >>> orbit = sarcl.Orbit.kepler(semi_major_axis=7.07e6, eccentricity=0, inclination=1.71)
+    >>> place = orbit.geolocate(10.0, 900e3, heights=0.0)  # zero-Doppler time, s, and slant range, m
+    >>> [round(float(value), 3) for value in orbit.locate(place)]
+    [10.0, 900000.0]
     """
 
     path: StateVectors | KeplerElements | TwoLineElements

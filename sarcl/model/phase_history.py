@@ -46,6 +46,13 @@ class PhaseHistory(EchoRows):
     A point of amplitude a at x gives a exp(-j 2 pi f (tau - tau_ref)), tau = (|tx - x| + |x - rx|)/c,
     tau_ref = 2 reference_range/c. ValueError names a field of wrong shape or value; samples that are
     read lazily are checked for NaN and Inf when they are read.
+
+    >>> measured = sarcl.PhaseHistory(
+    ...     raw.samples, frequency=raw.frequency, frequency_step=raw.frequency_step,
+    ...     tx=raw.tx, reference_range=raw.reference_range,
+    ... )
+    >>> measured.n_rows, measured.n_samples == raw.n_samples
+    (64, True)
     """
 
     samples: Any

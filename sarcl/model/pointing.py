@@ -20,14 +20,23 @@ UP = (0.0, 0.0, 1.0)
 
 
 def fixed(track: Trajectory, direction: ArrayLike, *, up: ArrayLike | None = None) -> Trajectory:
-    """Boresight along one direction, (3,) or (n, 3), at every pulse. up: vertical, (3,) or (n, 3)."""
+    """Boresight along one direction, (3,) or (n, 3), at every pulse. up: vertical, (3,) or (n, 3).
+
+    >>> sarcl.pointing.fixed(track, (-1, 0, -1)).attitude[0, :, 0].round(3)
+    array([-0.707,  0.   , -0.707])
+    """
     validation.instance("track", track, Trajectory)
     look = _units("direction", direction, len(track))
     return _looking(track, look, _vertical(track, up))
 
 
 def spotlight(track: Trajectory, point: ArrayLike, *, up: ArrayLike | None = None) -> Trajectory:
-    """Boresight towards a point, m (3,), or (n, 3) if it moves. ValueError where an antenna stands on it."""
+    """Boresight towards a point, m (3,), or (n, 3) if it moves. ValueError where an antenna stands on it.
+
+    >>> aimed = sarcl.pointing.spotlight(track, (0, 0, 0))
+    >>> dish = sarcl.Antenna.gaussian(width=(0.02, 0.02))
+    >>> raw = sarcl.echo(scene, chirp, aimed, antenna=dish)
+    """
     validation.instance("track", track, Trajectory)
     target = _vectors("point", point, len(track))
     return _looking(track, _units("point - position", target - track.positions, len(track)), _vertical(track, up))
@@ -45,6 +54,9 @@ def stripmap(
 
     side  "right" or "left" of the velocity, seen from above. The azimuth axis is in the plane of boresight and
     velocity, so that rows of an aperture lie along the track; its sense follows from z, which points up.
+
+    >>> sarcl.pointing.stripmap(track, look=np.pi / 4, side="left").attitude[0, :, 0].round(3)
+    array([-0.707,  0.   , -0.707])
     """
     validation.instance("track", track, Trajectory)
     look = validation.number("look", look, least=0)
@@ -72,6 +84,10 @@ def steered(track: Trajectory, azimuth: ArrayLike, elevation: ArrayLike = 0.0) -
     """The track's attitude rotated to (azimuth, elevation) rad, one or per pulse, in its own axes.
 
     The pattern rotates as a whole, as if the antenna did: sliding spotlight, scans, platform errors.
+
+    >>> aimed = sarcl.pointing.steered(sarcl.pointing.spotlight(track, (0, 0, 0)), azimuth=0.01)
+    >>> aimed.attitude.shape
+    (64, 3, 3)
     """
     validation.instance("track", track, Trajectory)
     axes = _attitude(track)
@@ -85,7 +101,12 @@ def steered(track: Trajectory, azimuth: ArrayLike, elevation: ArrayLike = 0.0) -
 
 
 def turned(track: Trajectory, angles: ArrayLike) -> Trajectory:
-    """The track's attitude rotated by rotation vectors, rad (3,) or (n, 3), in its own axes x, y, z."""
+    """The track's attitude rotated by rotation vectors, rad (3,) or (n, 3), in its own axes x, y, z.
+
+    >>> aimed = sarcl.pointing.turned(sarcl.pointing.spotlight(track, (0, 0, 0)), (0.0, 0.0, 0.01))
+    >>> aimed.attitude.shape
+    (64, 3, 3)
+    """
     validation.instance("track", track, Trajectory)
     from scipy.spatial.transform import Rotation
 
@@ -94,7 +115,14 @@ def turned(track: Trajectory, angles: ArrayLike) -> Trajectory:
 
 
 def from_quaternions(track: Trajectory, quaternions: ArrayLike, *, scalar_first: bool = True) -> Trajectory:
-    """Attitude from unit quaternions (n, 4), rotations from body to scene axes; w, x, y, z, or x, y, z, w."""
+    """Attitude from unit quaternions (n, 4), rotations from body to scene axes; w, x, y, z, or x, y, z, w.
+
+    >>> level = np.tile([1.0, 0, 0, 0], (len(track.positions), 1))
+    >>> sarcl.pointing.from_quaternions(track, level).attitude[0]
+    array([[1., 0., 0.],
+           [0., 1., 0.],
+           [0., 0., 1.]])
+    """
     from scipy.spatial.transform import Rotation
 
     validation.instance("track", track, Trajectory)

@@ -26,6 +26,9 @@ class Radar:
     ValueError names the wrong argument. Samples with a Radar are in sqrt(W): |sample|^2 is the power received from the
     scatterers during the pulse. Without one (the default of `sarcl.echo`) a unit cross section gives samples of modulus
     1 at any range.
+
+    >>> radar = sarcl.Radar(power=5e3, losses_db=3, noise_temperature=600)
+    >>> received = sarcl.echo(scene, chirp, track, radar=radar)  # samples in sqrt(W)
     """
 
     power: float
@@ -70,7 +73,11 @@ class Radar:
 
 
 def spreading(tx_range: ArrayLike, rx_range: ArrayLike) -> NDArray[np.float64]:
-    """1/(R_t R_r), 1/m^2. ValueError where a range is 0 or less: an antenna stands on a scatterer."""
+    """1/(R_t R_r), 1/m^2. ValueError where a range is 0 or less: an antenna stands on a scatterer.
+
+    >>> float(sarcl.radar.spreading(5e3, 1e4))
+    2e-08
+    """
     ranges = []
     for name, value in (("tx_range", tx_range), ("rx_range", rx_range)):
         r = validation.values(name, value)
@@ -90,6 +97,10 @@ def noise_variance(raw: PhaseHistory, temperature: float, waveform: Waveform | N
     A sample is the received spectrum over P's largest value (times the matched filter's, of peak 1, once compressed);
     noise of k T_s W/Hz over one period 1/df of the row contributes k T_s/df. A chirp has E = duration/bandwidth, so a
     point's focused signal-to-noise ratio is (its power) duration n_pulses/(k T_s): the energy over the noise density.
+
+    >>> variance = sarcl.radar.noise_variance(raw, temperature=290)  # W
+    >>> variance.shape
+    (64,)
     """
     validation.instance("raw", raw, PhaseHistory)
     if waveform is not None:

@@ -71,6 +71,10 @@ def read(
     FileNotFoundError names the missing file; ValueError the file that is of unknown format, truncated, damaged or
     different from the others, a pipe, or one that leads into other files. Rows are compared with the file's checksums
     when they are read: OSError names rows that are damaged.
+
+    >>> raw.save("echoes.h5")
+    >>> sarcl.read("echoes.h5").samples.shape == raw.samples.shape
+    True
     """
     autofocus, external = validation.flag("autofocus", autofocus), validation.flag("external", external)
     if isinstance(path, (list, tuple)):

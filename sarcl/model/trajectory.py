@@ -29,6 +29,10 @@ class Trajectory(NotebookTable):
                    and accelerations
 
     Raises ValueError when shapes disagree, a value is not finite, or times do not increase.
+
+    >>> flight = sarcl.Trajectory.line(start=(-5e3, -50, 4e3), velocity=(0, 100, 0), prf=100, n_pulses=101)
+    >>> flight.positions[50], flight.velocities[50]
+    (array([-5000.,     0.,  4000.]), array([  0., 100.,   0.]))
     """
 
     times: NDArray[np.float64] | None

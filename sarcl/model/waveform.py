@@ -28,6 +28,10 @@ class Waveform:
     signal     complex baseband samples (n,), kind "sampled" only;  rate  their sampling rate, Hz
 
     The pulse is centred on t = 0. Raises ValueError when a value is not finite or positive, or the band reaches 0 Hz.
+
+    >>> chirp = sarcl.Waveform.chirp(center=9.6e9, bandwidth=300e6, duration=1e-6)
+    >>> chirp.sweep_rate, abs(chirp.matched_spectrum(np.array([9.6e9])))
+    (300000000000000.0, array([1.]))
     """
 
     center: float

@@ -15,7 +15,14 @@ REMEDY = "sarcl doctor says what is wrong and how to mend it"
 
 
 class NoDeviceError(RuntimeError):
-    """No OpenCL device fits: none works, or none matches what was asked for."""
+    """No OpenCL device fits: none works, or none matches what was asked for.
+
+    >>> try:
+    ...     sarcl.echo(scene, chirp, track, device="abacus")
+    ... except sarcl.NoDeviceError as error:
+    ...     print("abacus" in str(error))
+    True
+    """
 
 
 def open_device(choice: DeviceChoice | None = None) -> Device:

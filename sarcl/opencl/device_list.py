@@ -62,6 +62,8 @@ def devices() -> tuple[DeviceInfo, ...]:
     The result of a trial is recorded in the user's cache folder (sarcl/devices.json) with the versions of driver,
     platform and trial; later processes do not repeat it. A trial that ended in an error, which may have been by chance,
     is repeated in each process, and `sarcl devices` tries every device again.
+
+    >>> names = [device.name for device in sarcl.devices()]
     """
     return tuple(tried(info.index) for info, _ in listed())
 

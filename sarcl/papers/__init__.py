@@ -37,7 +37,11 @@ PAPERS = {
 
 
 def find(name: str) -> Paper:
-    """The paper of this name. ValueError names those there are."""
+    """The paper of this name. ValueError names those there are.
+
+    >>> sarcl.papers.find("saras").title
+    'SARAS: Franceschetti et al. 1992, published and measured'
+    """
     if not isinstance(name, str) or name not in PAPERS:
         if not isinstance(name, str):
             raise TypeError(f"name is a {type(name).__name__}; give one of {', '.join(PAPERS)}")
@@ -47,7 +51,11 @@ def find(name: str) -> Paper:
 
 
 def listing() -> str:
-    """A line for each paper: its name, author, title and year."""
+    """A line for each paper: its name, author, title and year.
+
+    >>> print(sarcl.papers.listing().splitlines()[0])
+    farooq    J. Farooq, Frequency Diversity for Improving Synthetic Aperture Radar Imaging, dissertation, AFIT 2009
+    """
     return "\n".join(f"{name:10}{title}" for name, title in PAPERS.items())
 
 

@@ -118,6 +118,13 @@ def autofocus(
     TypeError, ValueError: arguments of the wrong kind; too few pulses; pulses that lack a channel others have; data
     not compressed; an image that is zero. SarclWarning: 1 % of the pixels or more lie outside the range window of
     every row. Sources: _phase_gradient.py; docs/theory/autofocus.md.
+
+    >>> from dataclasses import replace
+    >>> errors = np.cumsum(np.random.default_rng(1).normal(0, 0.3, raw.n_rows))  # rad, one per pulse
+    >>> blurred = replace(raw, samples=raw.samples * np.exp(1j * errors)[:, None])
+    >>> sharp, estimate = sarcl.autofocus(blurred, grid)
+    >>> bool(estimate.found)
+    True
     """
     instance("raw", raw, PhaseHistory)
     instance("grid", grid, ImageGrid)

@@ -61,6 +61,10 @@ class Scenario:
 
     A section may be left out until it is used. Python objects become tables; arrays and tuples become lists. ValueError
     names the file, line and table of an unknown or missing key, a wrong type, or a value that is refused.
+
+    >>> scenario = sarcl.Scenario(waveform=chirp, trajectory=track, scene=scene, grid=grid)
+    >>> scenario.focus(scenario.simulate()).shape
+    (128, 128)
     """
 
     waveform: Waveform | Table | None = None
@@ -251,6 +255,15 @@ def load(path: PathLike) -> Scenario:
     """Read a scenario file; mesh files are found relative to its folder.
 
     ValueError names file and line where the text is not TOML or not a scenario; FileNotFoundError.
+
+    >>> from pathlib import Path
+    >>> file = Path("small.toml")
+    >>> _ = file.write_text('''
+    ... waveform.chirp = {center = 9.6e9, bandwidth = 150e6, duration = 2e-6}
+    ... trajectory.circle = {radius = 7e3, height = 5e3, arc = 0.02, n_pulses = 64}
+    ... scene.points = [{positions = [[10, 0, 0]]}]
+    ... ''')
+    >>> raw = sarcl.scenario.load(file).simulate()
     """
     path = arguments.path("path", path)
     try:
@@ -261,7 +274,16 @@ def load(path: PathLike) -> Scenario:
 
 
 def loads(text: str, *, name: str = "scenario", folder: PathLike = ".") -> Scenario:
-    """A scenario from TOML text; messages name the file `name`. Raises as `load` does."""
+    """A scenario from TOML text; messages name the file `name`. Raises as `load` does.
+
+    >>> small = '''
+    ... waveform.chirp = {center = 9.6e9, bandwidth = 150e6, duration = 2e-6}
+    ... trajectory.circle = {radius = 7e3, height = 5e3, arc = 0.02, n_pulses = 64}
+    ... scene.points = [{positions = [[10, 0, 0]]}]
+    ... '''
+    >>> sarcl.scenario.loads(small).simulate().n_rows
+    64
+    """
     from ..io import toml
 
     if not isinstance(text, str):

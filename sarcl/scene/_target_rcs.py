@@ -38,6 +38,10 @@ def trihedral_rcs(
 
         triangular   l + m + n - 2/(l + m + n) where l + m >= n, else 4 l m/(l + m + n)
         square       l (4 - n/m) where m >= n/2, else 4 l m/n
+
+    >>> section = sarcl.shapes.trihedral_rcs(1.0, (1, 1, 1), 9.6e9)
+    >>> round(float(10 * np.log10(section)), 2)  # dBsm
+    36.33
     """
     side = validation.number("side", side, above=0)
     triangular = validation.choice("form", form, FORMS) == "triangular"
@@ -58,6 +62,10 @@ def dihedral_rcs(size: ArrayLike, direction: ArrayLike, frequency: ArrayLike) ->
 
     of direction (x, y, z), sinc(v) = sin(v)/v: 2 a b min(x, z) across the fold. A beam moves along the fold between
     its plates, by up to w, so that a strip reflects a length of b - w to b. Where w would exceed b, A falls by b/w.
+
+    >>> section = sarcl.shapes.dihedral_rcs((1, 1), (1, 0, 1), 9.6e9)
+    >>> round(float(10 * np.log10(section)), 2)  # dBsm
+    44.11
     """
     across, along = (validation.number(f"size[{i}]", v, above=0) for i, v in enumerate(_pair("size", size)))
     x, y, z = np.moveaxis(_directions(direction), -1, 0)
@@ -78,6 +86,10 @@ def top_hat_rcs(
 
     e is the elevation above the disc and L the part of the wall whose reflection on the disc returns. This is the
     dihedral of width sqrt(r lambda/(2 cos e)), the stationary phase of the round wall: k r cos e >> 1, not from above.
+
+    >>> section = sarcl.shapes.top_hat_rcs(1.0, 0.3, 0.8, (1, 0, 1), 9.6e9)
+    >>> round(float(10 * np.log10(section)), 2)  # dBsm
+    19.22
     """
     disc, radius = (
         validation.number(name, value, above=0)
@@ -94,7 +106,12 @@ def top_hat_rcs(
 
 def luneburg_rcs(radius: float, direction: ArrayLike, frequency: ArrayLike) -> NDArray[np.float64]:
     """`sarcl.shapes.luneburg(radius)`: A = pi radius^2, the lens's cross section, from every direction that its
-    reflector serves: 4 pi^3 radius^4/lambda^2."""
+    reflector serves: 4 pi^3 radius^4/lambda^2.
+
+    >>> section = sarcl.shapes.luneburg_rcs(0.15, (1, 0, 0), 9.6e9)
+    >>> round(float(10 * np.log10(section)), 2)  # dBsm
+    18.09
+    """
     area = np.pi * validation.number("radius", radius, above=0) ** 2
     return _of_area(np.broadcast_to(area, _directions(direction).shape[:-1]), frequency)
 

@@ -44,6 +44,11 @@ class Material:
     `Material()` is a perfect conductor; a real eps_r alone gives a lossless dielectric. ValueError for impossible
     values.
     Source: Franceschetti et al. 1992 (SARAS), eq. (11) and appendix.
+
+    >>> wet = sarcl.Material(eps_r=15 - 3j, height=0.004, diagram="cos")
+    >>> field = sarcl.Scene.from_heights([0, 5, 10], [0, 5, 10], np.zeros((3, 3)), material=wet)
+    >>> field.materials[0].eps_r
+    (15-3j)
     """
 
     eps_r: complex = None  # type: ignore[assignment]
@@ -248,6 +253,9 @@ def itu(name: str) -> Material:
     name  "concrete", "brick", "plasterboard", "wood", "glass", "ceiling board", "chipboard", "plywood", "marble",
           "very dry ground", "medium dry ground" or "wet ground"
     ValueError for another name.
+
+    >>> round(float(sarcl.material.itu("concrete").permittivity(9.6e9).real), 2)
+    5.24
     """
     a, b, c, d, low, high = _ITU[validation.choice("name", name, tuple(_ITU))]
     return Material(a, c, exponents=(b, d), band=(low * 1e9, high * 1e9), name=name)

@@ -50,6 +50,12 @@ class Scene(NotebookTable):
                      0 for other points, the default
     heights          (x, y, z) of the largest terrain of from_heights in the scene, if any: no antenna may stand
                      under it, and `echo` leaves it out as an occluder where all of it lies below every line of sight
+
+    >>> ground = sarcl.Scene.from_heights([-20, 0, 20], [-20, 0, 20], np.zeros((3, 3)))
+    >>> house, lamp = sarcl.shapes.box((4, 2, 3)), sarcl.Scene.points([[-5, 0, 1]], amplitudes=10)
+    >>> scene = ground + house.on(ground, 5, 0) + lamp
+    >>> len(scene.triangles), len(scene.positions)
+    (20, 1)
     """
 
     positions: NDArray[np.float64]

@@ -58,7 +58,11 @@ class ClosedOptions(SurfaceOptions, total=False):
 def plate(
     size: ArrayLike, *, edge: float | None = None, two_sided: ArrayLike = True, **options: Unpack[SurfaceOptions]
 ) -> Scene:
-    """A rectangle of size (x, y), m, about the origin in z = 0, facing up: two facets, or more if `edge` requires."""
+    """A rectangle of size (x, y), m, about the origin in z = 0, facing up: two facets, or more if `edge` requires.
+
+    >>> len(sarcl.shapes.plate((2, 1)).triangles)
+    2
+    """
     x, y = _dimensions("size", size, 2)
     corners = np.array([[[-x, -y, 0], [x, -y, 0]], [[-x, y, 0], [x, y, 0]]]) / 2
     return _place(geometry.of_grid(corners), edge, two_sided=two_sided, **options)
@@ -72,13 +76,21 @@ def disc(
     two_sided: ArrayLike = True,
     **options: Unpack[SurfaceOptions],
 ) -> Scene:
-    """A circular disc about the origin in z = 0, facing up."""
+    """A circular disc about the origin in z = 0, facing up.
+
+    >>> len(sarcl.shapes.disc(1).triangles)
+    72
+    """
     radius = _length("radius", radius)
     return _revolve([(radius, 0), (0, 0)], edge, sections, two_sided=two_sided, **options)
 
 
 def box(size: ArrayLike, *, edge: float | None = None, **options: Unpack[ClosedOptions]) -> Scene:
-    """A right parallelepiped of size (x, y, z), m: twelve facets, or more if `edge` requires."""
+    """A right parallelepiped of size (x, y, z), m: twelve facets, or more if `edge` requires.
+
+    >>> len(sarcl.shapes.box((4, 2, 3), material="concrete").triangles)
+    12
+    """
     x, y, z = _dimensions("size", size, 3)
     low, high = np.array([-x / 2, -y / 2, 0]), np.array([x / 2, y / 2, z])
     sides = []
@@ -102,7 +114,11 @@ def cylinder(
     sections: int | None = None,
     **options: Unpack[ClosedOptions],
 ) -> Scene:
-    """An upright circular cylinder with its lids."""
+    """An upright circular cylinder with its lids.
+
+    >>> len(sarcl.shapes.cylinder(2, 4).triangles)
+    288
+    """
     radius, height = _length("radius", radius), _length("height", height)
     return _revolve([(0, 0), (radius, 0), (radius, height), (0, height)], edge, sections, **options)
 
@@ -115,7 +131,11 @@ def cone(
     sections: int | None = None,
     **options: Unpack[ClosedOptions],
 ) -> Scene:
-    """An upright circular cone with its base."""
+    """An upright circular cone with its base.
+
+    >>> len(sarcl.shapes.cone(3, 5).triangles)
+    144
+    """
     radius, height = _length("radius", radius), _length("height", height)
     return _revolve([(0, 0), (radius, 0), (0, height)], edge, sections, **options)
 
@@ -129,7 +149,11 @@ def frustum(
     sections: int | None = None,
     **options: Unpack[ClosedOptions],
 ) -> Scene:
-    """A truncated cone of radii `bottom` and `top` with its lids; sections=4 makes it a truncated pyramid."""
+    """A truncated cone of radii `bottom` and `top` with its lids; sections=4 makes it a truncated pyramid.
+
+    >>> len(sarcl.shapes.frustum(3, 1, 4).triangles)
+    288
+    """
     bottom, top = _length("bottom", bottom), _length("top", top)
     height = _length("height", height)
     return _revolve([(0, 0), (bottom, 0), (top, height), (0, height)], edge, sections, **options)
@@ -141,6 +165,9 @@ def sphere(
     """A sphere about the origin: an icosahedron with edges divided into n parts, 20 n^2 facets of similar size.
 
     n follows from `edge`, or is the smallest that gives at least `facets`, default 2000.
+
+    >>> len(sarcl.shapes.sphere(1).triangles)
+    2000
     """
     radius = _length("radius", radius)
     if edge is not None and facets is not None:
@@ -168,6 +195,10 @@ def tank(
     Closed bodies that overlap: hull with a sloped front, tracks, side boxes, turret, gun, cupola with a mast, drums at
     the rear (`sarcl/scene/_tank.py`); the paper prints the size alone. Other sizes stretch it. The thinnest part is the
     gun, 0.24 m. sections: of every round part.
+
+    >>> sarcl.shapes.tank().bounds
+    array([[-4.79 , -2.005,  0.   ],
+           [ 4.79 ,  2.005,  4.02 ]])
     """
     stretch = np.array(_dimensions("size", size, 3)) / _tank.SIZE
     finest = None if edge is None else validation.number("edge", edge, above=0) / float(stretch.max())
@@ -185,6 +216,9 @@ def trihedral(
     """A corner of three plates at right angles: vertex at the origin, folds of length `side`, m, along x, y and z.
 
     It opens along (1, 1, 1). form: of its plates, "triangular" (the corner of a cube cut off) or "square".
+
+    >>> len(sarcl.shapes.trihedral(1.0).triangles)
+    3
     """
     side, n = _length("side", side), 3 if validation.choice("form", form, FORMS) == "triangular" else 4
     axes = side * np.eye(3)
@@ -201,6 +235,9 @@ def dihedral(
     """Two plates at a right angle, of size (across, along) the fold, m: x from 0 in z = 0, and z from 0 in x = 0.
 
     The fold lies along y, its middle at the origin; it opens along (1, 0, 1).
+
+    >>> len(sarcl.shapes.dihedral((1, 1)).triangles)
+    4
     """
     across, along = _dimensions("size", size, 2)
     ends = np.array([-along / 2, along / 2])
@@ -218,7 +255,12 @@ def top_hat(
     two_sided: ArrayLike = True,
     **options: Unpack[SurfaceOptions],
 ) -> Scene:
-    """An upright cylinder with its lid on a disc about the origin: a dihedral from all sides."""
+    """An upright cylinder with its lid on a disc about the origin: a dihedral from all sides.
+
+    >>> target = sarcl.shapes.top_hat(1.0, 0.3, 0.8, position=(0, 0, 0.1))
+    >>> target.bounds[1]
+    array([1. , 1. , 0.9])
+    """
     disc, radius = _length("disc_radius", disc_radius), _length("cylinder_radius", cylinder_radius)
     height = _length("height", height)
     check_brim(disc, radius)
@@ -233,6 +275,9 @@ def luneburg(radius: float, *, position: ArrayLike = (0.0, 0.0, 0.0)) -> Scene:
     real lens serves those for which its reflector lies behind it. The path through the lens, of index
     sqrt(2 - (r/radius)^2), is longer than in air: a real lens appears pi/2 radius behind its centre, seen from the
     radar. `position` is where it appears.
+
+    >>> sarcl.shapes.luneburg(0.15, position=(0, 0, 1)).positions
+    array([[0., 0., 1.]])
     """
     area = np.pi * _length("radius", radius) ** 2
     position = validation.array("position", position, np.float64, (3,))

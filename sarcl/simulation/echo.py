@@ -23,6 +23,7 @@ def echo(scene: Scene, waveform: Waveform, track: Trajectory, options: EchoOptio
     scene         points (|amplitude|^2 = RCS, m^2) and facets: physical optics with the materials' Fresnel
                   coefficients, the exact phase of the wave over every facet (docs/theory/facets.md); single scattering,
                   or several reflections (docs/theory/bounces.md)
+    waveform      the pulse, whose matched spectrum W is
     track         transmitter; or a list of tracks: a list of phase histories is returned, each with the samples of a
                   call of its own. `receiver` is a list of as many then, and `out` a folder, with a file for each track
     {options}
@@ -36,6 +37,10 @@ def echo(scene: Scene, waveform: Waveform, track: Trajectory, options: EchoOptio
     holds the finished echoes: the check measured more than the tolerance. ValueError: tiles of other echoes in
     "PATH.parts". ValueError, MemoryError, sarcl.NoDeviceError say what else does not fit.
     Source: the echo equation of sarcl/__init__.py.
+
+    >>> raw = sarcl.echo(scene, chirp, track, tolerance=1e-4, polarization=("HH", "VV"))
+    >>> raw.samples.shape[0] == 2 * len(track.positions), raw.report.predicted_error <= 1e-4
+    (True, True)
     """
     clock = Clock()
     return EchoPlan.of(echo_task(scene, waveform, track, options), clock)

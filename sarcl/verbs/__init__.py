@@ -54,6 +54,10 @@ def plan(*args: Any, **options: Any) -> Forecast[Any]:
     Returns a Forecast: method, plan, seconds, bytes, predicted_error, error_terms, cheaper, n_rows, n_samples. Its
     run() carries out this very plan; ValueError where a file of echoes has changed meanwhile. TypeError for what is no
     verb, and for options that the verb does not have; else plan raises and warns as the verb does.
+
+    >>> forecast = sarcl.plan(sarcl.echo, scene, chirp, track, tolerance=1e-3)
+    >>> forecast.n_rows, forecast.n_samples == raw.n_samples
+    (64, True)
     """
     is_short = not args or isinstance(args[0], PhaseHistory)  # plan(raw, grid, ...)
     verb, subjects = (__getattr__("backproject"), args) if is_short else (args[0], args[1:])

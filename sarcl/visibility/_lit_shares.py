@@ -38,11 +38,17 @@ def facet_shares(
     """Share of the area of each facet that both antennas see at each pulse, 0 to 1: float32 (n_pulses, k).
 
     Exact, as `echo` takes it: facets are clipped along the shadows' edges, and one-sided ones that face away are dark.
+
     device    leaves this to another device on the machine where it has no float64;  progress  called as
               progress(pulse, pulses)
 
     ValueError for a scene without facets, or a receiver of another length; MemoryError for more shares than memory
     holds; NoDeviceError where no device has float64. Source: docs/theory/shadows.md.
+
+    >>> box = sarcl.shapes.box((4, 2, 3))
+    >>> shares = sarcl.illumination.facet_shares(box, track)
+    >>> shares.shape, float(shares.min()), float(shares.max())
+    ((64, 12), 0.0, 1.0)
     """
     instance("scene", scene, Scene)
     ends = _ends(track, receiver)
@@ -84,6 +90,11 @@ def pixel_shares(
 
     Facets within 1e-6 of the scene's size of a pixel do not hide it. ValueError for a scene without facets, a receiver
     of another length, or a tolerance of 0. Source: docs/theory/shadows.md.
+
+    >>> box = sarcl.shapes.box((4, 2, 3))
+    >>> shadow = sarcl.illumination.pixel_shares(box, grid, track) < 0.5
+    >>> bool(shadow[64, 64])  # the ground below the box too
+    True
     """
     instance("scene", scene, Scene)
     instance("grid", grid, ImageGrid)

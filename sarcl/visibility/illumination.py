@@ -87,12 +87,17 @@ class Illumination:
     dark        (k,) bool: facets of which nothing is illuminated at any viewpoint
     full        (k,) bool: facets that are wholly illuminated at every viewpoint
     changing    (k,) bool: facets whose shares are not the same at every viewpoint
-    dark_facets number of facets of which nothing is illuminated, per block (n_blocks,)
+    dark_facets  number of facets of which nothing is illuminated, per block (n_blocks,)
     window      (first, stop): pulses that `spans` and `fraction_at` count from `first`; all other members are of the
                 whole track
     sampling    estimated error of the amplitudes, roots of the shares, relative to their norm: shares from samples
     motion      the same of levels between viewpoints
     reached     accuracy that can be asked for, where the error is larger than what was
+
+    >>> box = sarcl.shapes.box((4, 2, 3))
+    >>> light = sarcl.illumination.lit(box.triangles, track.positions, two_sided=False)
+    >>> light.fraction_at(20).shape, light.blocks.shape == (len(light.viewpoints), 2)
+    ((12,), True)
     """
 
     blocks: np.ndarray
@@ -282,6 +287,11 @@ def lit(
                 anew each time they are asked for
 
     Warns with SarclWarning where nothing at all is illuminated.
+
+    >>> box = sarcl.shapes.box((4, 2, 3))
+    >>> lighting = sarcl.illumination.lit(box.triangles, track.positions, two_sided=False)
+    >>> lighting.error < 0.02
+    True
     """
     tx = array("tx", tx, np.float64, ("n_pulses", 3))
     ends = [tx] if rx is None else [tx, array("rx", rx, np.float64, (len(tx), 3))]

@@ -32,6 +32,10 @@ def sweep(case: Case, **values: float | Sequence[object] | np.ndarray) -> list[C
 
     ValueError for a key that no case has, a list without values, more than 64 cases, a band that is not a whole number
     of steps, and a combination that is not a valid case.
+
+    >>> case = sarcl.fda.Case("array", n=9, frequency_step=100e6)
+    >>> [c.n for c in sarcl.fda.sweep(case, n=[9, 15])]
+    [9, 15]
     """
     validation.instance("case", case, Case)
     return cases({name: getattr(case, name) for name in Case.__dataclass_fields__}, values)

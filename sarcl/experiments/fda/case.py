@@ -53,6 +53,10 @@ class Case:
 
     Where phase centres spread over more than 5 % of the aperture, their mean follows the track, otherwise the
     reference element does. ValueError names the key that does not fit.
+
+    >>> case = sarcl.fda.Case("array", n=9, frequency_step=100e6)
+    >>> case.n, case.frequency_step
+    (9, 100000000.0)
     """
 
     name: str

@@ -53,7 +53,12 @@ def run(
     device: DeviceChoice | None = None,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> list[dict[str, Any]]:
-    """Measurements of each case: plain numbers, ready for JSON."""
+    """Measurements of each case: plain numbers, ready for JSON.
+
+    >>> case = sarcl.fda.Case("array", n=9, frequency_step=100e6, mappings=("corrected",))
+    >>> [measured["name"] for measured in sarcl.fda.run([case])]
+    ['array']
+    """
     if not isinstance(cases, Sequence) or not all(isinstance(case, Case) for case in cases):
         raise TypeError(f"cases is {shown(cases)}; give a list of fda.Case")
     arguments.progress(progress)
@@ -72,6 +77,10 @@ def measure(case: Case, device: DeviceChoice | None = None) -> dict[str, Any]:
 
     "not_applicable" holds the other mappings, with the reason; "collected" the spatial frequencies of the channels;
     "resolved_if" the limits of what `pair` measures within which two points are resolved (`is_resolved`).
+
+    >>> case = sarcl.fda.Case("array", n=9, frequency_step=100e6, mappings=("corrected",))
+    >>> "collected" in sarcl.fda.measure(case)
+    True
     """
     rows: dict[str, dict[str, Any]] = {}
     refused: dict[str, str] = {}
@@ -126,7 +135,11 @@ def _map(case: Case, raw: PhaseHistory, name: str) -> PhaseHistory:
 
 
 def cut(raw: PhaseHistory, case: Case, y: float, device: DeviceChoice | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Image along cross-range about (0, y, 0): positions, m (n,), and amplitudes (n,), 1 for a focused unit point."""
+    """Image along cross-range about (0, y, 0): positions, m (n,), and amplitudes (n,), 1 for a focused unit point.
+
+    >>> case = sarcl.fda.Case("array", n=9, frequency_step=100e6)
+    >>> across, amplitudes = sarcl.fda.cut(raw, case, 0.0)
+    """
     from ...imaging.backproject import backproject
     from ...model.image_grid import ImageGrid
 
@@ -141,6 +154,12 @@ def response(at: np.ndarray, values: np.ndarray, place: float) -> dict[str, floa
     """Response of a point: error of the peak's position, m; its level, dB; null, half-power width, m; PSLR, ISLR, dB.
 
     "inside" is False where the highest value is the first or last of the cut, and therefore no peak.
+
+    >>> at = np.linspace(-10, 10, 401)  # m
+    >>> values = np.sinc(at)  # null 1 m from the peak
+    >>> response = sarcl.fda.response(at, values, 0.0)
+    >>> round(response["null"], 2), round(response["irw"], 2)
+    (1.0, 0.89)
     """
     from scipy.interpolate import CubicSpline
 
@@ -181,7 +200,13 @@ def _crossing(x: np.ndarray, power: np.ndarray, i: int, side: int) -> float:
 
 
 def dip(at: np.ndarray, values: np.ndarray, separation: float) -> float:
-    """Fall of the image between two points, dB below the lower of their peaks; 0 where there is only one peak."""
+    """Fall of the image between two points, dB below the lower of their peaks; 0 where there is only one peak.
+
+    >>> at = np.linspace(-10, 10, 401)  # m
+    >>> values = np.sinc(at - 1) + np.sinc(at + 1)  # two points, nulls 1 m from each
+    >>> sarcl.fda.dip(at, abs(values), separation=2.0) > 20
+    True
+    """
     return float(pair(at, values, separation)["dip_db"])
 
 
@@ -196,6 +221,12 @@ def pair(at: np.ndarray, values: np.ndarray, separation: float) -> Pair:
     Where there are not two peaks, one on each side and nearer to its point than the other point is, dip_db is 0, shift
     and false_db are None, and level_db and peaks refer to the highest value. An end of the cut counts as a peak where
     the level rises towards it.
+
+    >>> at = np.linspace(-10, 10, 401)  # m
+    >>> values = np.sinc(at - 1) + np.sinc(at + 1)  # two points, nulls 1 m from each
+    >>> apart = sarcl.fda.pair(at, abs(values), separation=2.0)
+    >>> [round(float(place), 2) for place in apart["peaks"]]
+    [-1.13, 1.13]
     """
     around = np.concatenate([[-1.0], values, [-1.0]])
     peaks = np.flatnonzero((values > around[:-2]) & (values >= around[2:]))
@@ -230,6 +261,11 @@ def is_resolved(two: Pair, null: float, least: float = RESOLVED) -> bool:
 
     There is a dip of `least` dB between two peaks, each within a quarter of `null`, m, of its point and at most 6 dB
     below a unit point in focus, and every other peak is 3 dB or more below the lower of the two. two: from `pair`
+
+    >>> at = np.linspace(-10, 10, 401)  # m
+    >>> values = np.sinc(at - 1) + np.sinc(at + 1)  # two points, nulls 1 m from each
+    >>> sarcl.fda.is_resolved(sarcl.fda.pair(at, abs(values), separation=2.0), null=1.0)
+    True
     """
     if two["shift"] is None or two["false_db"] is None:
         return False
@@ -239,7 +275,15 @@ def is_resolved(two: Pair, null: float, least: float = RESOLVED) -> bool:
 
 def told_apart(dips: Sequence[PairApart], null: float, least: float = RESOLVED) -> float | None:
     """The smallest separation, m, from which on two points are resolved at all that were tried; None: not even at the
-    largest. dips: from `pair`, with "separation"; null, m, and least: as for `is_resolved`."""
+    largest. dips: from `pair`, with "separation"; null, m, and least: as for `is_resolved`.
+
+    >>> at, dips = np.linspace(-10, 10, 401), []
+    >>> for d in (1.0, 1.5, 2.0):  # m
+    ...     cut = abs(np.sinc(at - d / 2) + np.sinc(at + d / 2))
+    ...     dips.append(sarcl.fda.pair(at, cut, d) | {"separation": d})
+    >>> sarcl.fda.told_apart(dips, null=1.0)
+    2.0
+    """
     out = None
     for row in sorted(dips, key=lambda d: -d["separation"]):
         if not is_resolved(row, null, least):
@@ -284,7 +328,11 @@ def _support(frequencies: np.ndarray) -> dict[str, Any]:
 
 
 def spatial_frequencies(raw: PhaseHistory, most: int = 40) -> np.ndarray:
-    """K = f/c (u_T + u_R) at the origin, of up to `most` samples per row, cycles/m (n, 2): along x and y."""
+    """K = f/c (u_T + u_R) at the origin, of up to `most` samples per row, cycles/m (n, 2): along x and y.
+
+    >>> sarcl.fda.spatial_frequencies(raw).shape[1]
+    2
+    """
     rows = spread_over(raw.n_samples, most)
     f = raw.frequency[:, None] + raw.frequency_step[:, None] * rows
     look = unit(raw.tx) + unit(raw.rx)
@@ -293,7 +341,12 @@ def spatial_frequencies(raw: PhaseHistory, most: int = 40) -> np.ndarray:
 
 def collected(case: Case, most: int = 101) -> dict[str, Any]:
     """Spread across, cycles/m, and spatial frequencies of the channels, each from its own phase centre, of up to `most`
-    pulses."""
+    pulses.
+
+    >>> case = sarcl.fda.Case("array", n=9, frequency_step=100e6)
+    >>> sorted(sarcl.fda.collected(case))
+    ['claimed', 'support']
+    """
     array, track = case.channels(), case.track()
     pulses = spread_over(case.n_pulses, most)
     turn = np.eye(3)[None] if track.attitude is None else track.attitude[pulses]

@@ -56,6 +56,11 @@ def fullwave_echo(scene: Scene, waveform: Waveform, track: Trajectory, options: 
     forecast.predicted_error is what anchors="auto" reaches; nan for given anchors, whose runs alone tell it. Bodies are
     cut by the grid, up to 5e7 cells, once for the forecast and its run; `out` is not written.
     Source: docs/theory/full_wave.md; after Zou, Jia and Qiao 2021 (waveform forming).
+
+    >>> ball = sarcl.shapes.sphere(0.05, facets=320)
+    >>> low = sarcl.Waveform.chirp(center=1.5e9, bandwidth=100e6, duration=1e-6)
+    >>> few = sarcl.Trajectory.circle(radius=100, height=50, arc=0.1, n_pulses=3)
+    >>> fields = sarcl.fullwave_echo(ball, low, few, tolerance=0.1)
     """
     clock = Clock()
     for name, value, kind in (("scene", scene, Scene), ("waveform", waveform, Waveform), ("track", track, Trajectory)):

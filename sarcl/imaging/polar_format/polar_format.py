@@ -59,6 +59,10 @@ def polar_format(raw: PhaseHistory, grid: ImageGrid, options: PolarFormatOptions
     points, one row. ToleranceUnreachable: a tolerance that cannot be met. ToleranceMissed: the check measured an
     error above the tolerance. MemoryError: max_bytes too small.
     Source: Farooq 2009, equations 2.59 to 2.64; docs/theory/polar_format.md.
+
+    >>> image = sarcl.polar_format(raw, grid, tolerance=1e-2)
+    >>> round(float(abs(image.data).max() / image.gain), 2)
+    1.0
     """
     instance("raw", raw, PhaseHistory)
     instance("grid", grid, ImageGrid)

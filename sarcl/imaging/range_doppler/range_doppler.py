@@ -54,6 +54,11 @@ def range_doppler(raw: PhaseHistory, options: RangeDopplerOptions) -> Plan[Image
     error above the tolerance.
     Source: Cumming and Wong, "Digital Processing of Synthetic Aperture Radar Data", 2005, chapter 6;
     docs/theory/range_doppler.md.
+
+    >>> flight = sarcl.Trajectory.line(start=(-5e3, -100, 4e3), velocity=(0, 100, 0), prf=400, n_pulses=800)
+    >>> image = sarcl.range_doppler(sarcl.echo(scene, chirp, flight))
+    >>> image.shape == (image.grid.times.size, image.grid.ranges.size)
+    True
     """
     instance("raw", raw, PhaseHistory)
     check_output(options.out)

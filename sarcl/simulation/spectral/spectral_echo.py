@@ -35,6 +35,11 @@ def spectral_echo(
     ToleranceUnreachable, a ValueError, for tolerances: both name `echo`. ToleranceMissed, ValueError, MemoryError and
     sarcl.NoDeviceError as `echo` does. With `tile`, returns None until the piece that completes the echoes.
     Source: docs/theory/spectral_echo.md; after Franceschetti, Migliaccio, Riccio and Schirinzi 1992 (SARAS).
+
+    >>> flight = sarcl.Trajectory.line(start=(-5e3, -100, 4e3), velocity=(0, 100, 0), prf=400, n_pulses=800)
+    >>> raw = sarcl.spectral_echo(scene, chirp, flight, tolerance=1e-2)
+    >>> raw.n_rows
+    800
     """
     clock = Clock()
     if options.ripple and isinstance(waveform, Waveform) and waveform.sweep_rate is None:
