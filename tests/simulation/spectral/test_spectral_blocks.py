@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.block_runs import Stopped, begin_earlier, names, observe, observe_devices, tiles
+from helpers.cases import quick_of
 from helpers.devices import as_gpu
 
 import sarcl
@@ -72,7 +73,7 @@ def same(one, two):
     return np.array_equal(one.samples[:], two.samples[:])
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", quick_of(["points", "pulse by pulse"], CASES))
 def test_pieces_in_any_order_have_the_bits_of_one_run(case, whole, tmp_path):
     for n in (2, 5):
         order = random.Random(n).sample(range(1, n + 1), n)
