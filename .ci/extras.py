@@ -40,7 +40,11 @@ far = sarcl.backproject(raw, grid, cluster=client)
 assert np.array_equal(far.data, image.data)
 """,
     "formats": """
-raw.save("a.cphd", origin=(47.2, 8.5, 420.0))
+words = dict(
+    CollectorName="simulator", CoreName="a point", ModeType="SPOTLIGHT", CollectionStart="2026-05-01T12:00:00",
+    Classification="UNCLASSIFIED", ReleaseInfo="UNRESTRICTED", ImageArea=((-12, -10), (12, 10)),
+)
+raw.save("a.cphd", origin=(47.2, 8.5, 420.0), metadata=words)
 assert sarcl.read("a.cphd").n_rows == raw.n_rows
 """,
     "jax": """
