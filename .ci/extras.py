@@ -145,7 +145,7 @@ def lowest(scratch: Path) -> int:
     bounds = [re.sub(r"\s*>=\s*", "==", line) for line in dependencies]
     print(*bounds, flush=True)
     tools = "pytest", "pytest-xdist", "sybil", "setuptools", "pyproj", "shapely", "sgp4"
-    python = environment(scratch / "lowest", *bounds, *tools, str(ROOT))
+    python = environment(scratch / "lowest", *bounds, *tools, "-e", str(ROOT))
     tests = [f"tests/{room}" for room in ROOMS.split()]
     settings = os.environ | {"PYTHONPATH": str(ROOT)}
     return subprocess.run([python, "-m", "pytest", "-q", "-n", "2", *tests], cwd=ROOT, env=settings).returncode
