@@ -14,6 +14,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..base.errors import SarclWarning
 from ..base.text import duration
 from ..io import formats, input_paths, output_paths
 from . import _doctor
@@ -340,8 +341,13 @@ def _say_report(what: str, report: Report | None, job: Job) -> None:
     logging.getLogger("sarcl").info("%s", report)
 
 
-def _show_warning(message: Warning | str, *rest: object, **more: object) -> None:
-    print(f"sarcl: warning: {message}", file=sys.stderr)
+def _show_warning(
+    message: Warning | str, category: type[Warning], filename: str, lineno: int, *rest: object, **more: object
+) -> None:
+    if issubclass(category, SarclWarning):
+        print(f"sarcl: warning: {message}", file=sys.stderr)
+    else:  # of another package: with its place, as Python shows it
+        print(warnings.formatwarning(message, category, filename, lineno), end="", file=sys.stderr)
 
 
 def device_table(devices: Sequence[Any], picked: Sequence[int]) -> str:

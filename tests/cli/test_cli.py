@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+import warnings
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -377,6 +378,15 @@ def test_what_simulate_has_to_warn_of_it_says_once(here, capsys):
     assert parser.main(["simulate", "s.toml"]) == 0
     said, warned = capsys.readouterr()
     assert warned == "" and "the track has no times" not in said
+
+
+@pytest.mark.filterwarnings("always::sarcl.SarclWarning")
+def test_warnings_of_other_packages_keep_their_place(here, capsys):
+    assert parser.main(["focus", "missing.h5"]) == 2
+    capsys.readouterr()
+    warnings.warn_explicit("old", DeprecationWarning, "other.py", 3)
+    warnings.warn_explicit("coarse", sarcl.SarclWarning, "scene.py", 4)
+    assert capsys.readouterr().err.splitlines() == ["other.py:3: DeprecationWarning: old", "sarcl: warning: coarse"]
 
 
 def test_echoes_that_are_not_compressed_are_compressed_first(here, capsys):

@@ -14,7 +14,10 @@ from pathlib import Path
 from sarcl import verbs
 
 STUB = Path(verbs.__file__).with_suffix(".pyi")
-EXTRAS = {"distributed": types.SimpleNamespace(Client=object)}  # packages of extras, which need not be installed
+EXTRAS = {  # packages of extras, which need not be installed
+    "distributed": types.SimpleNamespace(Client=object),
+    "xarray": types.SimpleNamespace(Dataset=object, DataArray=object),
+}
 
 
 def execute(node: ast.stmt, names: dict[str, typing.Any]) -> None:

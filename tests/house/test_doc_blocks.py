@@ -69,10 +69,10 @@ x = math.pi
 ```python
 >>> print(x)
 3.14
->>> math.sqrt(-1)
+>>> [].pop()
 Traceback (most recent call last):
     ...
-ValueError: math domain error
+IndexError: pop from empty list
 ```
 
 ```toml
@@ -98,7 +98,7 @@ def test_a_right_page_passes_and_leaves_no_file(tmp_path, monkeypatch):
         ("math.pi", "math.py", "AttributeError"),
         ("import math", "", "NameError"),
         ("3.14\n", "3.16\n", "Expected:\n    3.16"),
-        ("domain error", "range error", "range error"),
+        ("from empty", "from full", "from full"),
         ("n = 9", "m = 9", "'m'"),
         ("# case.toml\n", "", "does not name a file"),
         ("# case.toml", "# case.toml, continued", "does not exist yet"),

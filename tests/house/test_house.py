@@ -167,6 +167,8 @@ def test_modules_started_with_python_m_are_programs():
     assert {path.split("/")[0] for path, _ in found} >= {"sarcl", "tests"}
     for path, name in found:
         spec = importlib.util.find_spec(name)
+        if spec is None and name == "basedpyright":  # of the extra dev: its tests are skipped
+            continue
         assert spec and spec.origin, f"{path} starts {name}"
         if spec.submodule_search_locations:
             spec = importlib.util.find_spec(f"{name}.__main__")

@@ -2,8 +2,10 @@
 
 import bz2
 import re
+import warnings
 import zipfile
 
+import collada
 import numpy as np
 import pytest
 import trimesh
@@ -93,6 +95,21 @@ def test_a_geometry_that_no_node_places_and_one_that_other_nodes_refer_to(tmp_pa
     path.write_text(path.read_text().replace("</library_geometries>", f"{other}</library_geometries>"))
     with pytest.raises(ValueError, match="1 of 2 geometries cannot be read"):
         sarcl.Scene.from_mesh(path)
+
+
+def test_deprecations_within_pycollada_do_not_refuse_a_file(tmp_path, monkeypatch):
+    """As with NumPy 2.5, where warnings are errors."""
+
+    class Outdated(collada.Collada):
+        def __init__(self, *arguments, **options):
+            old = "Setting the shape on a NumPy array has been deprecated"
+            warnings.warn_explicit(old, DeprecationWarning, "polylist.py", 144, module="collada.polylist")
+            super().__init__(*arguments, **options)
+
+    monkeypatch.setattr(collada, "Collada", Outdated)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert area(sarcl.Scene.from_mesh(dae(tmp_path / "a.dae", polylist("3", "0 1 2")))) == pytest.approx(2.0)
 
 
 def archive(path, **files):

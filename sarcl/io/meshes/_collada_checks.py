@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import io
+import warnings
 from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +16,14 @@ if TYPE_CHECKING:
     import collada
 
 AGAIN = "export it again"
+
+
+@contextmanager
+def without_deprecations() -> Iterator[None]:
+    """No warnings about pycollada's own use of NumPy: they say nothing of the file, and as errors would refuse it."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", category=DeprecationWarning, module="collada")
+        yield
 
 
 def open_document(data: bytes) -> collada.Collada:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import zipfile
 from collections.abc import Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -159,14 +160,15 @@ def _scene(
     elif kind == ".dae" and zipfile.is_zipfile(io.BytesIO(data)):
         raise ValueError(f"{what} is a zip file, wanted XML: give it the name .zae")
     try:
-        collada = _collada_checks.open_document(data) if kind == ".dae" else None
-        # process=False: merging and reordering corners is not needed and hides what the file holds
-        scene = trimesh.load_scene(
-            io.BytesIO(data),
-            file_type=str(path.absolute()) if path else kind[1:],
-            process=False,
-            resolver=cast(trimesh.resolvers.Resolver, others),
-        )
+        with _collada_checks.without_deprecations() if kind == ".dae" else nullcontext():
+            collada = _collada_checks.open_document(data) if kind == ".dae" else None
+            # process=False: merging and reordering corners is not needed and hides what the file holds
+            scene = trimesh.load_scene(
+                io.BytesIO(data),
+                file_type=str(path.absolute()) if path else kind[1:],
+                process=False,
+                resolver=cast(trimesh.resolvers.Resolver, others),
+            )
     except Exception as exc:
         if isinstance(others, other_files.Resolver):
             _check_refused(others, what)
