@@ -91,6 +91,11 @@ def _check_samples(raw: PhaseHistory) -> None:
         raise ValueError(
             "weight differs from 1, which CPHD has no place for; give dataclasses.replace(raw, weight=None)"
         )
+    if raw.array is not None and raw.tx_channel is None and (raw.array.positions.any() or raw.array.offsets.any()):
+        raise ValueError(
+            f"the rows are sums over the {raw.array.n} elements of an array, and a CPHD vector has one phase centre "
+            "and one carrier; give sarcl.echo channels='separated', or save sarcl.map_aperture(raw, 'channels')"
+        )
 
 
 def _reference_point(
@@ -152,7 +157,9 @@ def _surface(
 
 
 def _channels(raw: PhaseHistory, words: Words, time: np.ndarray, version: str) -> tuple[ChannelRows, ...]:
-    """Rows of equal transmitting and receiving channel and polarisation, in order; their times must increase."""
+    """Rows of equal transmitting and receiving channel, polarisation, and carrier of an array, in order; their times
+    must increase.
+    """
     letters = POLARIZATIONS | (LATER if version == "1.1.0" else {})
     if raw.polarization is None:
         pair = words.text("TxPol"), words.text("RcvPol")
@@ -170,15 +177,17 @@ def _channels(raw: PhaseHistory, words: Words, time: np.ndarray, version: str) -
         )
     zeros = np.zeros(raw.n_rows, int)
     tx, rx = (zeros if each is None else each for each in (raw.tx_channel, raw.rx_channel))
-    rows_of: dict[tuple[int, int, str], list[int]] = {}
-    for row, key in enumerate(zip(tx.tolist(), rx.tolist(), labels.tolist(), strict=True)):
+    # a plan gives an element other carriers from some pulse on; without an array rows may differ in each frequency
+    carrier = np.zeros(raw.n_rows) if raw.array is None else raw.frequency
+    rows_of: dict[tuple[int, int, str, float], list[int]] = {}
+    for row, key in enumerate(zip(tx.tolist(), rx.tolist(), labels.tolist(), carrier.tolist(), strict=True)):
         rows_of.setdefault(key, []).append(row)
     channels = []
     for number, (key, members) in enumerate(rows_of.items()):
         rows = np.array(members)
         if not (np.diff(time[rows]) > 0).all():
             raise ValueError(
-                f"times of the rows of channel {key} do not increase, as CPHD wants; sort the rows by time"
+                f"times of the rows of channel {key[:3]} do not increase, as CPHD wants; sort the rows by time"
             )
         channels.append(ChannelRows(f"{number + 1}", names[key[2]], (key[0], key[1]), rows))
     return tuple(channels)
