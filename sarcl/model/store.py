@@ -64,6 +64,7 @@ def read(
     blur the others by 6 % and move the scene by 0.7 m.
     A CPHD file (pip install sarcl[formats]), by its path or an open binary file, gives a PhaseHistory in Earth-fixed
     coordinates, whose samples stay in the file. Its channels become rows where they have equally many samples.
+    Echoes of chirps in a CRSD file are compressed when they are read.
     A SICD file whose grid is a plane gives an Image, whose pixels stay in the file. An ending that sarcl has not may be
     that of an installed package (docs/developers/extensions.md).
     external=True follows links and datasets of an HDF5 file that lead into other files, for files that you trust.
@@ -99,7 +100,7 @@ def read(
         result, form = formats.load_open(cast(IO[bytes], path), _make, **rows)
     else:
         raise TypeError(f"path is a {type(path).__name__}; give a file name or a list of file names")
-    if form is formats.CPHD or (channel is None and polarization is None):
+    if form in (formats.CPHD, formats.CRSD) or (channel is None and polarization is None):
         return result
     if not isinstance(result, PhaseHistory):
         raise ValueError(f"{str(path)!r} holds an image; channel= and polarization= choose rows of echoes")

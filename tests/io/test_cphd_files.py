@@ -240,7 +240,7 @@ def test_an_open_file_is_read_as_its_path_is(path):
         back = sarcl.read(file)
         np.testing.assert_array_equal(back.read(3, 30), raw.read(3, 30))
         np.testing.assert_array_equal(back.tx, raw.tx)
-    with pytest.raises(ValueError, match="open files are read as CPHD or SICD"):
+    with pytest.raises(ValueError, match="open files are read as CPHD, CRSD or SICD"):
         sarcl.read(io.BytesIO(b"\x89HDF\r\n\x1a\n"))
 
 

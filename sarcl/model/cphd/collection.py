@@ -33,6 +33,7 @@ class CphdOptions(NamedTuple):
     domain: str
     sgn: int
     version: str
+    kind: str = "CPHD"
 
 
 def collection_of(raw: PhaseHistory, options: CphdOptions) -> Collection:
@@ -41,9 +42,9 @@ def collection_of(raw: PhaseHistory, options: CphdOptions) -> Collection:
     validation.choice("version", options.version, ("1.0.1", "1.1.0"))
     if options.sgn not in (-1, 1) or isinstance(options.sgn, bool):
         raise ValueError(f"sgn is {options.sgn!r}; give -1, or +1: then the samples are conjugated")
-    _check_samples(raw)
-    words, is_local = Words("CPHD", options.metadata, (*REQUIRED, *OPTIONAL, *OTHERS)), options.origin is not None
-    corner, local = frame(raw.tx[0], "CPHD", options.origin, options.axes)
+    _check_samples(raw, options.kind)
+    words, is_local = Words(options.kind, options.metadata, (*REQUIRED, *OPTIONAL, *OTHERS)), options.origin is not None
+    corner, local = frame(raw.tx[0], options.kind, options.origin, options.axes)
     time = per_row(raw, words, "time", "TxTime", ())
     velocities = [
         per_row(raw, words, name, key, (3,)) @ local
@@ -83,18 +84,20 @@ def collection_of(raw: PhaseHistory, options: CphdOptions) -> Collection:
     )
 
 
-def _check_samples(raw: PhaseHistory) -> None:
-    """ValueError for what CPHD cannot say of samples."""
+def _check_samples(raw: PhaseHistory, kind: str) -> None:
+    """ValueError for what a file of a kind cannot say of samples."""
     if not raw.compressed:
-        raise ValueError("the echoes are not compressed, and CPHD holds compressed ones; call sarcl.compress first")
+        raise ValueError(
+            f"the echoes are not compressed, and {kind} is written of compressed ones; call sarcl.compress first"
+        )
     if raw.weight is not None and not (raw.weight == 1).all():
         raise ValueError(
-            "weight differs from 1, which CPHD has no place for; give dataclasses.replace(raw, weight=None)"
+            f"weight differs from 1, which {kind} has no place for; give dataclasses.replace(raw, weight=None)"
         )
     if raw.array is not None and raw.tx_channel is None and (raw.array.positions.any() or raw.array.offsets.any()):
         raise ValueError(
-            f"the rows are sums over the {raw.array.n} elements of an array, and a CPHD vector has one phase centre "
-            "and one carrier; give sarcl.echo channels='separated', or save sarcl.map_aperture(raw, 'channels')"
+            f"the rows are sums over the {raw.array.n} elements of an array, and a {kind} vector has one phase "
+            "centre and one carrier; give sarcl.echo channels='separated', or save sarcl.map_aperture(raw, 'channels')"
         )
 
 
