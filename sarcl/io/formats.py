@@ -50,7 +50,7 @@ class Format:
     """
 
     endings: tuple[str, ...]
-    starts: bytes = b""
+    starts: bytes | tuple[bytes, ...] = b""
     name: str = ""
     file: str = ""
     options: tuple[str, ...] = ()
@@ -92,7 +92,8 @@ CRSD = Format((".crsd",), b"CRSDsar/", "CRSD files", "cphd._crsd_reading", ("cha
 SICD = Format((".nitf", ".ntf", ".sicd"), b"NITF", "SICD files", "sicd._reading", writes=("product",))
 # recognised by their content: a folder, and HDF5 of another kind
 ZARR, NETCDF = (Format((ending,), file="labelled_files", writes=("dataset",)) for ending in (".zarr", ".nc"))
-GEOTIFF = Format((".tif", ".tiff"), file="geotiff", writes=("map",))
+TIFF = b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"  # of either order of bytes, and of files of more than 4 GB
+GEOTIFF = Format((".tif", ".tiff"), TIFF, "GeoTIFF maps (image.save)", "geotiff", writes=("map",))
 FORMATS = (
     Format((".png",), writes=("picture",)),
     HDF5,
