@@ -14,7 +14,7 @@ from ..base.report import Report
 from ..base.text import interval, size_text
 from ..io import formats, hdf5
 from ._echo_rows import EchoRows
-from ._row_fields import LEAST_STEP, PER_ROW, RowFields, check_axis, one_per_row
+from ._row_fields import PER_ROW, RowFields, check_axis, one_per_row
 from .lazy_rows import in_memory
 
 if TYPE_CHECKING:
@@ -130,11 +130,12 @@ class PhaseHistory(EchoRows):
                 f"frequency_step[{int(np.argmin(self.frequency_step))}] is {self.frequency_step.min():g} Hz; "
                 "it must be positive: reverse the samples of a falling sweep"
             )
-        if not (self.frequency_step >= LEAST_STEP).all():
+        if not (self.frequency_step >= constants.LEAST_STEP).all():
             step = float(self.frequency_step.min())
             raise ValueError(
                 f"frequency_step is {step:g} Hz, a swath of {constants.SPEED_OF_LIGHT / 2 / step:.2g} m; steps are at "
-                f"least {LEAST_STEP:g} Hz, swaths 3e8 m: is it in MHz? Give {1e6 * step:g}"
+                f"least {constants.LEAST_STEP:g} Hz, swaths at most {constants.WIDEST_SWATH:g} m: is it in MHz? Give "
+                f"{1e6 * step:g}"
             )
         if not (self.frequency > 0).all():
             bad = int(np.argmin(self.frequency))
