@@ -24,7 +24,8 @@ SPACE = "http://api.nsgreg.nga.mil/schema/cphd/"
 # Per-vector parameters that must be finite; positive where True
 NEEDED = {"TxTime": False, "TxPos": False, "RcvPos": False, "SRPPos": False, "TxVel": False, "RcvVel": False}
 NEEDED |= {"FX1": True, "FX2": True, "TOA1": False, "TOA2": False, "SC0": False, "SCSS": True, "aFDOP": False}
-COUPLING = 0.1  # of a range resolution: a shift from which on the coupling of range and Doppler is told
+NEEDED |= {"aFRR1": False, "aFRR2": False}
+COUPLING = 0.1, 1.0  # cycles over the band, range resolutions: coupling of range and Doppler that is told, and refused
 NEGLIGIBLE = 0.01  # cycles of phase: 0.16 mm of range at 10 GHz
 ALL_ZERO = ("TxPos", "RcvPos", "SRPPos")  # positions at the centre of the Earth: a file that was not filled in
 
@@ -49,14 +50,20 @@ def load(
             area = image_area(library, reader.metadata.xmltree)
             parts = [_rows(reader, file, root, each, area) for each in selection]
             coupling = max(part.pop("coupling") for part in parts)
+            if coupling > COUPLING[1]:
+                raise Refused(
+                    "has coupled range and Doppler (aFRR1, aFRR2), which sarcl does not correct: targets in corners "
+                    f"of its image area would be moved or blurred by {coupling:.2g} range resolutions; have it written "
+                    "without the coupling, or for a smaller area"
+                )
             fields = {field: joined([part[field] for part in parts]) for field in parts[0]}
             if np.array_equal(fields["rx"], fields["tx"]):
                 fields["rx"] = None
             fields |= {"image_area": area, "metadata": text(reader)}
-        if coupling > COUPLING:
+        if coupling > COUPLING[0]:
             warn(
-                f"{name}: range and Doppler are coupled (aFRR1), which is not corrected: targets in the corners of the "
-                f"image area are moved by {coupling:.1%} of the range resolution"
+                f"{name}: range and Doppler are coupled (aFRR1, aFRR2), which is not corrected: targets in the corners "
+                f"of the image area are moved or blurred by {coupling:.1%} of the range resolution"
             )
         return made_of(make, "phase history", fields, name)
 
@@ -172,8 +179,8 @@ def _rows(reader: Reader, file: IO[bytes], root: Element, channel: Channel, area
 
 
 def _coupling(pvp: np.ndarray, area: np.ndarray) -> float:
-    """Largest shift in the corners of the image area by aFRR1, in range resolutions c/(2 B): aFRR1 dv B."""
-    if not pvp["aFRR1"].any():
+    """Largest shift and blur in the corners of the image area, in c/(2 B): aFRR1 dv B and aFRR2 dv B^2/4 added up."""
+    if not (pvp["aFRR1"].any() or pvp["aFRR2"].any()):
         return 0.0
     corners = [area[0] + i * area[1] + j * area[2] for i in (-1, 1) for j in (-1, 1)]
 
@@ -182,8 +189,9 @@ def _coupling(pvp: np.ndarray, area: np.ndarray) -> float:
         lines = [(pvp[f"{end}Pos"] - points, pvp[f"{end}Vel"]) for end in ("Tx", "Rcv")]
         return np.mean([np.einsum("ij,ij->i", v, r) / np.linalg.norm(r, axis=1) for r, v in lines], axis=0)
 
-    shift = [np.abs(pvp["aFRR1"] * (pvp["FX2"] - pvp["FX1"]) * (rate(x) - rate(pvp["SRPPos"]))).max() for x in corners]
-    return float(np.nanmax(shift))
+    band = pvp["FX2"] - pvp["FX1"]
+    cycles = np.abs(pvp["aFRR1"] * band) + np.abs(pvp["aFRR2"] * band**2 / 4)
+    return float(max((cycles * np.abs(rate(x) - rate(pvp["SRPPos"]))).max() for x in corners))
 
 
 def _scale(pvp: np.ndarray) -> np.ndarray:
