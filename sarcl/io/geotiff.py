@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 # tags of sarcl's files that are numbers: fields of an image by their names, and the size of each
 NUMBERS = {"band": 2, "time": 2, "tx": 3, "rx": 3, "tx_velocity": 3, "rx_velocity": 3}
+LEVEL = 0.1  # m, by which heights of pixels may differ that are taken for one: level planes follow no ellipsoid
 SAME = 1e-6  # pixels, by which the axes in the tags may differ from those of the file: rounding of its corner
 TILE = 512  # pixels along a tile's side, and rows that are written at once
 COPIES = 3  # of the pixels on the disk while a file is made: without tiles, overviews, and the file itself
@@ -185,7 +186,7 @@ def load(path: Path, make: Make[T]) -> T:
         if stamp(opened) != before:
             raise OSError(f"{name} has changed while it was read; read it again with sarcl.read")
     low, high = fields.pop("heights")
-    if not low == high:
+    if not high - low <= LEVEL:
         known = "does not say the heights of its pixels" if np.isnan(low) else f"has pixels at {low:g} to {high:g} m"
         warn(f"{name} {known}: positions are {fields['grid']['height']:g} m above the ellipsoid")
     return made_of(make, "image", fields, name)
