@@ -95,7 +95,7 @@ def map_aperture(
         along = -(towards * _rotated(rotation, _progression(array))).sum(axis=1) / distance
         cycles = element * (along * base / SPEED_OF_LIGHT)[:, None]
     samples = np.asarray(raw.samples) * np.exp(2j * np.pi * np.mod(cycles, 1.0))
-    moved = replace(raw, samples=validation.sealed(samples.astype(raw.samples.dtype)))
+    moved = replace(raw, samples=validation.sealed(samples.astype(raw.samples.dtype)), array=None)
     if mapping == "corrected":
         return moved
     up = validation.direction("vertical", vertical)

@@ -4,7 +4,7 @@ For other folders:
 
     added_grids    grids of installed packages: positions of their pixels, by blocks
     elevation      elevation models through rasterio: positions on WGS84
-    cphd/          CPHD files
+    cphd/          CPHD and CRSD files
     entry_points   objects that installed packages add: file formats, grids, scattering models, verbs
     geotiff        images as GeoTIFF through rasterio, with overviews
     formats        table of the file formats of phase histories and images: names, first bytes, reader, writers
@@ -15,7 +15,7 @@ For other folders:
     orbit_files    state vectors of orbit files in XML
     other_files    files that a mesh or an elevation model names: those of its own folder
     output_paths   output files: checked before the computation, written completely or not at all
-    sarkit_library  sarkit's modules for CPHD and SICD, and the files that they read in place
+    sarkit_library  sarkit's modules for CPHD, CRSD and SICD, and the files that they read in place
     sarcl_hdf5     sarcl's own HDF5 file: a phase history or an image, read and written as plain fields
     sicd/          SICD files
     toml           TOML: line numbers of keys, and values written back as text

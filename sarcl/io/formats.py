@@ -50,7 +50,7 @@ class Format:
     """
 
     endings: tuple[str, ...]
-    starts: bytes = b""
+    starts: bytes | tuple[bytes, ...] = b""
     name: str = ""
     file: str = ""
     options: tuple[str, ...] = ()
@@ -88,15 +88,18 @@ HDF5 = Format(
     by_blocks=True,
 )
 CPHD = Format((".cphd",), b"CPHD/", "CPHD files", "cphd._reading", ("channel", "polarization"))
+CRSD = Format((".crsd",), b"CRSDsar/", "CRSD files", "cphd._crsd_reading", ("channel", "polarization"))
 SICD = Format((".nitf", ".ntf", ".sicd"), b"NITF", "SICD files", "sicd._reading", writes=("product",))
 # recognised by their content: a folder, and HDF5 of another kind
 ZARR, NETCDF = (Format((ending,), file="labelled_files", writes=("dataset",)) for ending in (".zarr", ".nc"))
-GEOTIFF = Format((".tif", ".tiff"), file="geotiff", writes=("map",))
+TIFF = b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"  # of either order of bytes, and of files of more than 4 GB
+GEOTIFF = Format((".tif", ".tiff"), TIFF, "GeoTIFF maps (image.save)", "geotiff", writes=("map",))
 FORMATS = (
     Format((".png",), writes=("picture",)),
     HDF5,
     Format((".mat",), b"MATLAB 5.0 MAT-file", "AFRL Gotcha .mat files (MATLAB 5)", "_gotcha", ("autofocus",)),
     CPHD,
+    CRSD,
     SICD,
     ZARR,
     NETCDF,
@@ -177,12 +180,14 @@ def check_writable(path: PathLike, n_bytes: int = 0) -> None:
 
 
 def load_open(file: IO[bytes], make: Make[T], **options: object) -> tuple[T, Format]:
-    """`load` of an open binary file, which CPHD and SICD are read from. ValueError for other formats."""
+    """`load` of an open binary file, which CPHD, CRSD and SICD are read from. ValueError for other formats."""
     file.seek(0)
-    head = file.read(len(CPHD.starts))
-    form = next((f for f in (CPHD, SICD) if head.startswith(f.starts)), None)
+    head = file.read(len(CRSD.starts))
+    form = next((f for f in (CPHD, CRSD, SICD) if head.startswith(f.starts)), None)
     if form is None:
-        raise ValueError(f"the open file starts with {head!r:.40}; open files are read as CPHD or SICD: give a path")
+        raise ValueError(
+            f"the open file starts with {head!r:.40}; open files are read as CPHD, CRSD or SICD: give a path"
+        )
     return form.functions.load(file, make, **{n: v for n, v in options.items() if n in form.options}), form
 
 

@@ -1,4 +1,4 @@
-"""Images as GeoTIFF through rasterio (pip install sarcl[maps]): cloud-optimised files (COG) with overviews.
+"""Images as GeoTIFF through rasterio (pip install sarcl[maps]): cloud-optimised files (COG) with overviews, and back.
 
 Rows come block by block, north first. Overviews halve both axes until the image fits into one tile: levels in dB and
 amplitudes are averaged in power, which keeps the brightness of speckle; of complex numbers and masks every second
@@ -8,14 +8,18 @@ pixel is taken, because a mean would cancel phases.
 from __future__ import annotations
 
 import tempfile
+import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.errors import warn
 from . import output_paths
+from .formats import Make, T
+from .sarkit_library import Refused, made_of, parsing, stamp
 
 if TYPE_CHECKING:
     from types import ModuleType
@@ -24,6 +28,10 @@ if TYPE_CHECKING:
 
     from ..base.types import PathLike
 
+# tags of sarcl's files that are numbers: fields of an image by their names, and the size of each
+NUMBERS = {"band": 2, "time": 2, "tx": 3, "rx": 3, "tx_velocity": 3, "rx_velocity": 3}
+LEVEL = 0.1  # m, by which heights of pixels may differ that are taken for one: level planes follow no ellipsoid
+SAME = 1e-6  # pixels, by which the axes in the tags may differ from those of the file: rounding of its corner
 TILE = 512  # pixels along a tile's side, and rows that are written at once
 COPIES = 3  # of the pixels on the disk while a file is made: without tiles, overviews, and the file itself
 POWER = {"db": 10.0, "amplitude": 0.5}  # 10 log10 of a power, or its root
@@ -154,3 +162,89 @@ def _mean_level(values: np.ndarray, kind: str) -> np.ndarray:
     with np.errstate(divide="ignore", invalid="ignore"):  # NaN of no data, and -inf dB of no signal
         mean = np.where(has_data, quarters, 0).sum(axis=(1, 3)) / has_data.sum(axis=(1, 3))
         return np.asarray(10 * np.log10(mean) if kind == "db" else np.sqrt(mean))
+
+
+def load(path: Path, make: Make[T]) -> T:
+    """make("image", fields) of a map: one of sarcl's, or of complex pixels in one band of a north-up map with a CRS.
+
+    Amplitudes and decibels become intensities; pixels without data 0, where the gain is 0. fields["grid"] has the CRS,
+    `map_axes`, and one height for all pixels.
+    ValueError, which names the file: truncated, damaged, without a CRS, rotated, pixels of unknown meaning. OSError:
+    it changed while it was read. ImportError without rasterio.
+    """
+    rasterio = import_rasterio(str(path))
+    name = repr(str(path))
+    with (
+        open(path, "rb") as opened,
+        rasterio.Env(GDAL_DISABLE_READDIR_ON_OPEN="EMPTY_DIR", GDAL_PAM_ENABLED="NO"),  # no other files
+        warnings.catch_warnings(),
+    ):
+        warnings.simplefilter("ignore", rasterio.errors.NotGeoreferencedWarning)  # becomes an error here
+        before = stamp(opened)
+        with parsing(name), rasterio.open(path, driver="GTiff") as file:
+            fields = _fields(file)
+        if stamp(opened) != before:
+            raise OSError(f"{name} has changed while it was read; read it again with sarcl.read")
+    low, high = fields.pop("heights")
+    if not high - low <= LEVEL:
+        known = "does not say the heights of its pixels" if np.isnan(low) else f"has pixels at {low:g} to {high:g} m"
+        warn(f"{name} {known}: positions are {fields['grid']['height']:g} m above the ellipsoid")
+    return made_of(make, "image", fields, name)
+
+
+def _fields(file: rasterio.DatasetReader) -> dict[str, Any]:
+    """Fields of an Image; "heights" are the least and largest of its pixels, NaN where the file has none."""
+    tags = file.tags()
+    value = tags.get("VALUE", "").split(" ")[0] if tags.get("SOFTWARE", "").startswith("sarcl ") else ""
+    kind = np.dtype(file.dtypes[0]).kind if file.dtypes[0] != "complex_int16" else "c"
+    if file.crs is None:
+        raise Refused("is no map: it has no coordinate reference system; have it geocoded to one")
+    if (file.count > 1 and value not in POWER) or (value or "complex") not in (*POWER, "complex"):
+        raise Refused(f"has {file.count} bands, wanted one of complex pixels, or a map that sarcl wrote")
+    if not value and kind != "c":
+        raise Refused(
+            f"has {file.dtypes[0]} pixels, which may be amplitudes, intensities, decibels or no radar image; sarcl "
+            "reads complex pixels, and its own maps"
+        )
+    t = file.transform
+    if t.b or t.d or t.a <= 0 or t.e >= 0:
+        raise Refused("is rotated, or its first row is not the northern one; have it warped to a north-up map")
+    axes = np.array([t.c + t.a / 2, t.f + t.e * (file.height - 0.5), t.a, -t.e])
+    stored = _numbers(tags, "AXES", 4)
+    if stored is not None and (np.abs(stored - axes) <= SAME * axes[[2, 3, 2, 3]]).all():
+        axes = stored
+    pixels = file.read(1)[::-1]
+    has_data = ~np.isnan(pixels) if file.nodata is None or np.isnan(file.nodata) else pixels != file.nodata
+    if value in POWER:
+        pixels = pixels.astype(np.float64)
+        pixels = 10 ** (pixels / 10) if value == "db" else pixels**2
+    elif pixels.dtype.kind != "c":
+        raise Refused(f"is said to be complex, and has {file.dtypes[0]} pixels: another program has changed it")
+    if not np.isfinite(pixels[has_data]).all():
+        raise Refused("has pixels that are infinite; have it written without")
+    heights = _numbers(tags, "HEIGHTS", 2)
+    heights = np.full(2, np.nan) if heights is None else heights
+    numbers = {name: _numbers(tags, name.upper(), n) for name, n in NUMBERS.items()} if value else {}
+    frequency = _numbers(tags, "FREQUENCY", 1) if value else None
+    words = {name: tags.get(name.upper()) for name in ("window", "polarization")} if value else {}
+    crs, height = file.crs.to_wkt(), 0.0 if np.isnan(heights[0]) else float(heights.mean())
+    return {
+        "data": np.where(has_data, pixels, 0),
+        "grid": {"shape": file.shape, "crs": crs, "map_axes": axes, "height": height},
+        "gain": 1.0 if has_data.all() else has_data.astype(np.float32),
+        "frame": "earth-fixed",
+        "heights": tuple(heights.tolist()),
+        "frequency": None if frequency is None else float(frequency[0]),
+        **numbers,
+        **words,
+    }
+
+
+def _numbers(tags: Mapping[str, str], name: str, n: int) -> np.ndarray | None:
+    """The numbers (n,) of a tag; None where there is none. ValueError for others."""
+    if name not in tags:
+        return None
+    values = np.array([float(word) for word in tags[name].split()])
+    if values.shape != (n,) or not np.isfinite(values).all():
+        raise Refused(f"has the tag {name} = {tags[name]!r:.60}, wanted {n} numbers: it is damaged")
+    return values

@@ -34,8 +34,8 @@ class Refused(Exception):
     """What is wrong with a file, after its name, with a remedy."""
 
 
-def library(name: Literal["cphd", "sicd"]) -> ModuleType:
-    """sarkit.cphd or sarkit.sicd; ImportError names the extra that has it."""
+def library(name: Literal["cphd", "crsd", "sicd"]) -> ModuleType:
+    """sarkit.cphd, crsd or sicd; ImportError names the extra that has it."""
     try:
         module = import_module(f"sarkit.{name}")
         nitf = import_module("jbpy")  # sarkit's reader of NITF

@@ -21,9 +21,6 @@ PER_ROW: dict[str, tuple[DTypeLike, tuple[int, ...]]] = {
 }
 
 
-LEAST_STEP = 0.5  # Hz: a range window of 3e8 m, which holds 1e8 m on either side of the reference, and its pulses
-
-
 class RowFields(TypedDict, total=False):
     """The optional fields of a PhaseHistory that have one entry per row."""
 

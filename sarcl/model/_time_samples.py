@@ -28,11 +28,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ..base import validation
-from ..base.constants import SPEED_OF_LIGHT
+from ..base.constants import LEAST_STEP, SPEED_OF_LIGHT
 from ..base.errors import warn
 from ..base.rows import spread_over
 from ..base.types import LazyRows
-from ._row_fields import LEAST_STEP
 from ._time_record import ROUNDING, Signal, Sweep, TimeRecord, signal_of
 from .waveform import Waveform
 

@@ -324,7 +324,7 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
         """Write "name.png" (the picture of `show`), "name.h5", "name.zarr" or "name.nc", which lose nothing, SICD, or
         the map "name.tif".
 
-        `sarcl.read` opens .h5, .zarr and .nc. Zarr and NetCDF are the dataset of `to_xarray`, made in memory
+        `sarcl.read` opens them all but pictures. Zarr and NetCDF are the dataset of `to_xarray`, made in memory
         (sarcl[xarray]). A map is a GeoTIFF with overviews, cloud-optimised (sarcl[maps]), of an Earth-fixed image. On a
         grid by `ImageGrid.on_map` pixels are written as they are; those of other grids are resampled block by block.
         Values are over the gain: a unit point has modulus 1. NaN means no data.

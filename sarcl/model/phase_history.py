@@ -14,7 +14,7 @@ from ..base.report import Report
 from ..base.text import interval, size_text
 from ..io import formats, hdf5
 from ._echo_rows import EchoRows
-from ._row_fields import LEAST_STEP, PER_ROW, RowFields, check_axis, one_per_row
+from ._row_fields import PER_ROW, RowFields, check_axis, one_per_row
 from .lazy_rows import in_memory
 
 if TYPE_CHECKING:
@@ -130,11 +130,12 @@ class PhaseHistory(EchoRows):
                 f"frequency_step[{int(np.argmin(self.frequency_step))}] is {self.frequency_step.min():g} Hz; "
                 "it must be positive: reverse the samples of a falling sweep"
             )
-        if not (self.frequency_step >= LEAST_STEP).all():
+        if not (self.frequency_step >= constants.LEAST_STEP).all():
             step = float(self.frequency_step.min())
             raise ValueError(
                 f"frequency_step is {step:g} Hz, a swath of {constants.SPEED_OF_LIGHT / 2 / step:.2g} m; steps are at "
-                f"least {LEAST_STEP:g} Hz, swaths 3e8 m: is it in MHz? Give {1e6 * step:g}"
+                f"least {constants.LEAST_STEP:g} Hz, swaths at most {constants.WIDEST_SWATH:g} m: is it in MHz? Give "
+                f"{1e6 * step:g}"
             )
         if not (self.frequency > 0).all():
             bad = int(np.argmin(self.frequency))
@@ -331,22 +332,38 @@ class PhaseHistory(EchoRows):
         sgn       -1 or +1: the sign of the phase of a return
         version   "1.1.0" or "1.0.1"
 
-        ValueError for what a CPHD file must have and the echoes lack, with the key of metadata= that gives it.
+        CRSD (a path that ends in .crsd) holds received signals: the echoes of the chirp that was sent, `waveform`, from
+        which compression made these samples. It takes origin, axes and metadata as CPHD does, and in metadata too
+        TxRefRadIntensity, TxRadIntErrorStdDev, TxRefLAtm, RcvRefIrradiance, RcvIrradianceErrorStdDev, RcvRefLAtm,
+        PNCRSD and BNCRSD, in CRSD's units; where the echoes have no waveform TXmt, s, and FxRate, Hz/s, of the chirp.
+
+        ValueError for what a file must have and the echoes lack, with the key of metadata= that gives it.
         `path` may be the file that the samples are read from. Raises ValueError for a NaN or Inf in lazily read
         samples, and FileNotFoundError, PermissionError and the like before anything is written. On any exception `path`
         is unchanged.
         """
-        if formats.named(arguments.path("path", path), [formats.CPHD]) is not None:
+        form = formats.named(arguments.path("path", path), [formats.CPHD, formats.CRSD])
+        is_plain = (domain, sgn, version) == ("FX", -1, "1.1.0")
+        if form is formats.CPHD:
             from ..io.cphd import writing
             from .cphd.collection import CphdOptions, collection_of
 
             options = CphdOptions(origin, axes, metadata, domain, sgn, version)
             writing.save(path, collection_of(self, options), self.read)
             return
-        if not (origin is axes is metadata is None) or (domain, sgn, version) != ("FX", -1, "1.1.0"):
+        if (form is None and not origin is axes is metadata is None) or not is_plain:
             raise ValueError(
-                f"origin, axes, metadata, domain, sgn and version are for CPHD, and {str(path)!r} does not end in .cphd"
+                f"origin, axes, metadata, domain, sgn and version are for CPHD (of CRSD the first three), and "
+                f"{str(path)!r} does not end so"
             )
+        if form is formats.CRSD:
+            from ..io.cphd import crsd_writing
+            from .cphd.collection import CphdOptions
+            from .cphd.signals import crsd_of
+
+            options = CphdOptions(origin, axes, metadata, domain, sgn, version, "CRSD")
+            crsd_writing.save(path, *crsd_of(self, options), self.read)
+            return
         if formats.save_added(path, self):
             return
         writer = formats.writer_functions(path, "phase history").EchoWriter(

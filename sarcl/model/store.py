@@ -64,8 +64,10 @@ def read(
     blur the others by 6 % and move the scene by 0.7 m.
     A CPHD file (pip install sarcl[formats]), by its path or an open binary file, gives a PhaseHistory in Earth-fixed
     coordinates, whose samples stay in the file. Its channels become rows where they have equally many samples.
-    A SICD file whose grid is a plane gives an Image, whose pixels stay in the file. An ending that sarcl has not may be
-    that of an installed package (docs/developers/extensions.md).
+    Echoes of chirps in a CRSD file are compressed when they are read.
+    A SICD file whose grid is a plane gives an Image, whose pixels stay in the file. A GeoTIFF (sarcl[maps]) that
+    `Image.save` wrote gives an Image on the grid of its map, and so do complex pixels of other programs in one band.
+    An ending that sarcl has not may be that of an installed package (docs/developers/extensions.md).
     external=True follows links and datasets of an HDF5 file that lead into other files, for files that you trust.
     channel, polarization   only these rows, as `PhaseHistory.select` takes them; of CPHD the name of a channel too
     FileNotFoundError names the missing file; ValueError the file that is of unknown format, truncated, damaged or
@@ -99,7 +101,7 @@ def read(
         result, form = formats.load_open(cast(IO[bytes], path), _make, **rows)
     else:
         raise TypeError(f"path is a {type(path).__name__}; give a file name or a list of file names")
-    if form is formats.CPHD or (channel is None and polarization is None):
+    if form in (formats.CPHD, formats.CRSD) or (channel is None and polarization is None):
         return result
     if not isinstance(result, PhaseHistory):
         raise ValueError(f"{str(path)!r} holds an image; channel= and polarization= choose rows of echoes")
@@ -130,6 +132,10 @@ def _fields(kind: type[Waveform | AntennaArray | ImageGrid], stored: Mapping[str
 
 def _image(stored: Mapping[str, Any]) -> Image:
     grid = _fields(ImageGrid, stored["grid"])
+    if "height" in stored["grid"]:  # a map
+        from .maps.map_grid import placed
+
+        grid["crs"], grid["listed"] = placed(grid["crs"], grid["map_axes"], grid["shape"], stored["grid"]["height"])
     if grid["listed"] is None and any(grid[n] is None for n in ("center", "spacing", "x_axis", "y_axis")):
         raise KeyError("its grid is neither a plane nor a list of points")
     grid["shape"] = tuple(int(n) for n in grid["shape"])

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..base import wgs84
 from ..base.boxes import corners
-from ..base.constants import SPEED_OF_LIGHT
+from ..base.constants import LEAST_STEP, SPEED_OF_LIGHT, WIDEST_SWATH
 from ..base.errors import warn
 from ..base.validation import converted, finite, instance
 from ..earth.light_time import antennas_in_flight, receivers, transmitters
@@ -23,7 +23,6 @@ from ..scene.scene import Scene
 SOME_PULSES = 33  # at which the error of the receiver's positions over the scene is computed
 DEEPEST = -12e3  # m: lower than any ground, the bottom of the sea included
 WIDE = -1e-6  # cosine of the bistatic angle below which forward scatter matters; 90 deg itself is not beyond
-WIDEST = 1e8  # m about the reference: farther than from a geostationary orbit to the far side of the Earth
 LEAST_SAMPLES = 64  # in the default range window, so that a single point has a profile, too
 
 
@@ -146,10 +145,10 @@ def window(
         if pair.shape != (2,):
             raise ValueError(f"range_window is {asked!r}; give (near, far) in metres about the reference")
         finite("range_window", pair)
-        if np.abs(pair).max() > WIDEST:
+        if 2 * np.abs(pair).max() > WIDEST_SWATH:
             raise ValueError(
-                f"range_window reaches {np.abs(pair).max():g} m; windows about the reference lie within {WIDEST:g} m: "
-                "give (near, far) in metres"
+                f"range_window reaches {np.abs(pair).max():g} m on a side of the reference, and swaths, as wide on "
+                f"either side, {WIDEST_SWATH:g} m at most: give (near, far) in metres"
             )
         if not pair[0] < pair[1]:
             raise ValueError(f"range_window ({pair[0]:g}, {pair[1]:g}) is empty; near must be less than far")
@@ -171,4 +170,9 @@ def sampling(waveform: Waveform, near: float, far: float, compressed: bool) -> t
         period += waveform.duration  # so that pulses at the window's ends do not wrap
     n_samples = max(1, int(np.ceil(period * waveform.bandwidth * (1 - 1e-12))))
     step = waveform.bandwidth / n_samples
+    if step < min(LEAST_STEP, waveform.bandwidth):
+        raise ValueError(
+            f"the range window of {near:g} to {far:g} m and the pulse need a swath of {SPEED_OF_LIGHT / 2 / step:g} m, "
+            f"and swaths are at most {WIDEST_SWATH:g} m: give range_window=(near, far) in metres, or a nearer reference"
+        )
     return waveform.center - waveform.bandwidth / 2 + step / 2, step, n_samples

@@ -127,7 +127,7 @@ def test_levels_that_float32_does_not_hold_are_refused():
                         samples=np.full((64, 48), 1e-50 + 0j)), side="right", check=False),
         ),
         (r"frequency_step is 1e-30 Hz, a swath of 1.5e\+38 m; steps", lambda: replace(RAW, frequency_step=1e-30)),
-        (r"swaths 3e8 m: is it in MHz\? Give 390000", lambda: replace(RAW, frequency_step=0.39)),
+        (r"swaths at most 1e\+08 m: is it in MHz\? Give 1\.39e\+06", lambda: replace(RAW, frequency_step=1.39)),
         (r"gain_db is 10000; gains reach from -300 to 300 dB", lambda: sarcl.Antenna.isotropic(gain_db=1e4)),
         (r"gain_db is -700", lambda: sarcl.Antenna.isotropic(gain_db=-700.0)),
         (r"losses_db is 10000; at most 300 dB", lambda: sarcl.Radar(power=1.0, losses_db=1e4)),

@@ -190,18 +190,50 @@ def test_channels_are_polarisations_and_elements(tmp_path):
         sarcl.read(path, channel="7")
 
 
-def test_elements_of_a_frequency_diverse_array_are_channels_with_their_carriers(tmp_path):
-    array = sarcl.AntennaArray.linear(4, spacing=0.015, frequency_step=2e6, axis=(0, 1, 0))
+def diverse(receive="reference", channels="separated"):
+    """9 pulses of an array of 4 carriers, whose order is reversed after 4 pulses; one sample per carrier."""
+    array = sarcl.AntennaArray.linear(4, spacing=0.015, frequency_step=2e6, axis=(0, 1, 0)).mirrored(at=4, n_pulses=9)
     pulse = sarcl.Waveform.tone(center=10e9, duration=5e-7)
     track = sarcl.Trajectory.line(start=(-3e3, -20, 2e3), velocity=(0, 100, 0), prf=50.0, n_pulses=9)
-    raw = sarcl.echo(sarcl.Scene.points([[3.0, 2.0, 0.0]]), pulse, track, array=array, channels="separated")
-    raw.save(tmp_path / "x.cphd", origin=ORIGIN, metadata=METADATA)
-    assert errors(tmp_path / "x.cphd")[0] == set()
-    back = sarcl.read(tmp_path / "x.cphd")
-    for element in range(4):
-        part, same = back.select(sender=element), raw.select(sender=element)
-        np.testing.assert_array_equal(part.frequency, same.frequency)
-        np.testing.assert_allclose(part.read(0, 9), same.read(0, 9), atol=1e-6)
+    scene = sarcl.Scene.points([[3.0, 2.0, 0.0]])
+    return sarcl.echo(scene, pulse, track, array=array, channels=channels, receive=receive, reference=(0, 0, 0))
+
+
+@pytest.mark.parametrize(
+    ("domain", "sgn", "receive"), [("TOA", -1, "own"), pytest.param("FX", 1, "all", marks=pytest.mark.slow)]
+)
+def test_elements_of_a_frequency_diverse_array_are_channels_with_their_carriers(tmp_path, domain, sgn, receive):
+    raw, path = diverse(receive), tmp_path / "x.cphd"
+    raw.save(path, origin=ORIGIN, metadata=METADATA, domain=domain, sgn=sgn)
+    assert errors(path)[0] == set()
+    with open(path, "rb") as file, cphd.Reader(file) as reader:
+        names = [each.text for each in reader.metadata.xmltree.findall("{*}Data/{*}Channel/{*}Identifier")]
+        starts = {name: np.unique(reader.read_pvps(name)["FX1"]) for name in names}
+    n_receivers = 4 if receive == "all" else 1
+    assert len(starts) == 2 * 4 * n_receivers  # each element sends two carriers
+    assert all(len(start) == 1 for start in starts.values())
+    assert len(np.unique(np.concatenate(list(starts.values())))) == 4
+    back = sarcl.read(path)
+    order, same = (np.lexsort((rows.rx_channel, rows.tx_channel, rows.time)) for rows in (back, raw))
+    for name in ("frequency", "frequency_step", "reference_range", "tx_channel", "rx_channel", "time", "polarization"):
+        ours, theirs = getattr(raw, name)[same], getattr(back, name)[order]
+        if ours.dtype.kind == "f":
+            np.testing.assert_allclose(theirs, ours, rtol=1e-15, atol=2e-8 if name == "reference_range" else 0)
+        else:
+            np.testing.assert_array_equal(theirs, ours)
+    local, corner = sarcl.wgs84.local_axes(ORIGIN[1], ORIGIN[0]), sarcl.wgs84.ecef(ORIGIN[1], ORIGIN[0], ORIGIN[2])
+    np.testing.assert_allclose((back.tx[order] - corner) @ local.T, raw.tx[same], atol=1e-8)
+    np.testing.assert_allclose((back.rx[order] - corner) @ local.T, raw.rx[same], atol=1e-8)
+    np.testing.assert_allclose(back[order].read(0, back.n_rows), raw[same].read(0, raw.n_rows), atol=2e-6)
+
+
+def test_sums_over_the_elements_of_an_array_are_refused(tmp_path):
+    raw = diverse(channels="simultaneous")
+    with pytest.raises(ValueError, match=r"sums over the 4 elements.*channels='separated'"):
+        raw.save(tmp_path / "x.cphd", origin=ORIGIN, metadata=METADATA)
+    for mapping in ("channels", "corrected"):
+        sarcl.map_aperture(raw, mapping).save(tmp_path / "x.cphd", origin=ORIGIN, metadata=METADATA)
+        assert sarcl.read(tmp_path / "x.cphd").n_rows == (36 if mapping == "channels" else 9)
 
 
 @pytest.mark.parametrize("key", METADATA)

@@ -240,7 +240,7 @@ def test_an_open_file_is_read_as_its_path_is(path):
         back = sarcl.read(file)
         np.testing.assert_array_equal(back.read(3, 30), raw.read(3, 30))
         np.testing.assert_array_equal(back.tx, raw.tx)
-    with pytest.raises(ValueError, match="open files are read as CPHD or SICD"):
+    with pytest.raises(ValueError, match="open files are read as CPHD, CRSD or SICD"):
         sarcl.read(io.BytesIO(b"\x89HDF\r\n\x1a\n"))
 
 
@@ -443,5 +443,14 @@ def test_range_and_doppler_that_are_coupled_are_told(path, tmp_path):
     pvp["aFRR1"] = 2.6e-12
     sarcl.read(written(tmp_path / "y.cphd", tree, signal, pvp))  # 1e-5 of a resolution: no warning, which is an error
     pvp["aFRR1"] = 1e-7
-    with pytest.warns(sarcl.SarclWarning, match=r"coupled \(aFRR1\).* by 3[78]\.\d% of the range resolution"):
+    with pytest.warns(sarcl.SarclWarning, match=r"coupled \(aFRR1, aFRR2\).* by 3[78]\.\d% of the range resolution"):
+        sarcl.read(written(tmp_path / "y.cphd", tree, signal, pvp))
+    pvp["aFRR1"] = -3e-7
+    with pytest.raises(ValueError, match=r"y.cphd' has coupled range and Doppler .* by 1\.1 range resolutions"):
+        sarcl.read(written(tmp_path / "y.cphd", tree, signal, pvp))
+    pvp["aFRR1"], pvp["aFRR2"] = 0.0, 4e-7 / 94e6  # phases at the ends of the band as of aFRR1 = 1e-7
+    with pytest.warns(sarcl.SarclWarning, match=r"by 3[78]\.\d% of the range resolution"):
+        sarcl.read(written(tmp_path / "y.cphd", tree, signal, pvp))
+    pvp["aFRR2"][3] = np.nan
+    with pytest.raises(ValueError, match="aFRR2 = nan in vector 3"):
         sarcl.read(written(tmp_path / "y.cphd", tree, signal, pvp))

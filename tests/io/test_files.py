@@ -676,7 +676,7 @@ def test_a_new_format_is_one_file_and_one_line_of_the_table(tmp_path, monkeypatc
     (tmp_path / "b.toy").write_bytes(b"12345")
     with pytest.raises(
         ValueError,
-        match=r"although its name ends in '\.toy'; sarcl reads .*5\), CPHD files, SICD files and toys \(\.toy\)",
+        match=r"although its name ends in '\.toy'; sarcl reads .*CRSD files, SICD files, .* and toys \(\.toy\)",
     ):
         sarcl.read(tmp_path / "b.toy")
     with pytest.raises(SystemExit):

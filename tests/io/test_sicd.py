@@ -275,6 +275,48 @@ def test_an_image_under_a_beam_is_seen_pixel_by_pixel(tmp_path):
     assert number(tree, "Grid/Col/ImpRespBW") == pytest.approx(2 * 9.65e9 / C * 0.02, rel=0.06)
 
 
+@pytest.mark.parametrize("window", [None, pytest.param("hamming", marks=pytest.mark.slow)])
+def test_the_scale_factors_give_the_backscatter_of_clutter_and_the_cross_section_of_a_point(tmp_path, window):
+    """Points of a known mean power per area, whose pixels sarkit reads."""
+    rng, half, n = np.random.default_rng(11), 40.0, 3000
+    places = np.pad(rng.uniform(-half, half, (n, 2)), ((0, 0), (0, 1)))
+    amplitudes = (rng.normal(size=n) + 1j * rng.normal(size=n)) * np.sqrt(0.02 * (2 * half) ** 2 / n / 2)
+    track = sarcl.Trajectory.line(start=(-8e3, -60, 6e3), velocity=(0, 100, 0), prf=100.0, n_pulses=121)
+    chirp = sarcl.Waveform.chirp(center=9.6e9, bandwidth=150e6, duration=2e-6)
+    window_of_echoes = {"range_window": (-60, 60), "reference": (0, 0, 0)}
+    plane = sarcl.ImageGrid.plane(shape=(100, 100), spacing=0.5)
+    clutter, point = sarcl.Scene.points(places, amplitudes=amplitudes), sarcl.Scene.points([[3.0, -4.0, 0.0]])
+    for scene, wanted in ((clutter, None), (point, 1)):
+        raw = sarcl.echo(scene, chirp, track, **window_of_echoes)
+        image = sarcl.backproject(raw, plane, window=window)
+        image.save(tmp_path / "x.nitf", collection=raw, metadata=METADATA, origin=(47.2, 8.5, 420.0))
+        assert errors(tmp_path / "x.nitf")[0] == set()
+        tree, pixels = contents(tmp_path / "x.nitf")
+        scale = {k: number(tree, f"Radiometric/{k}SFPoly/Coef") for k in ("RCS", "SigmaZero", "BetaZero", "GammaZero")}
+        power = np.abs(pixels.astype(np.complex128)) ** 2
+        if wanted is None:
+            is_seen = (np.abs(places[:, :2]) < 25).all(axis=1)
+            density = (np.abs(amplitudes[is_seen]) ** 2).sum() / 50**2
+            assert power.mean() * scale["SigmaZero"] == pytest.approx(density, rel=0.1)  # of some 1000 cells
+        else:
+            assert power.max() * scale["RCS"] == pytest.approx(wanted, rel=1e-3)  # a pixel lies on it
+        assert scale["SigmaZero"] / scale["BetaZero"] == pytest.approx(0.8)  # sine of the incidence
+        assert scale["SigmaZero"] / scale["GammaZero"] == pytest.approx(0.6)  # and its cosine
+
+
+def test_other_rows_than_those_of_the_image_are_refused(tmp_path):
+    """Every second row has the same middle, band, first and last pulse."""
+    case = aircraft(False)
+    for window in (None, "hamming"):
+        image = focused(case, window=window, shape=(40, 40))
+        for rows in (slice(None, None, 2), slice(0, 80)):
+            other = replace(case, raw=case.raw[rows])
+            with pytest.raises(ValueError, match="give the phase history that the image was made of"):
+                saved(other, image, tmp_path / "x.nitf")
+    saved(case, replace(image, gain=1.0), tmp_path / "x.nitf")  # of an unknown gain
+    assert contents(tmp_path / "x.nitf")[0].find("{*}Radiometric") is None
+
+
 @pytest.mark.parametrize("key", METADATA)
 def test_what_is_missing_is_refused_with_its_key(tmp_path, key):
     case = aircraft(False)

@@ -56,7 +56,7 @@ def product(library: ModuleType, collection: Collection, pvps: list[np.ndarray])
     values = {**names, "RadarMode": mode}
     root["CollectionID"] = {n: values[n] for n in (*order, "CountryCode") if n in values}
     root["Global"] = _global(collection, pvps)
-    _put_scene(root["SceneCoordinates"], collection)
+    put_scene(root["SceneCoordinates"], collection)
     root["Data"] = _data(collection)
     _put_channels(root, collection, pvps)
     offset = 0
@@ -84,7 +84,7 @@ def _global(collection: Collection, pvps: list[np.ndarray]) -> dict[str, Any]:
     }
 
 
-def _put_scene(scene: Element, collection: Collection) -> None:
+def put_scene(scene: Element, collection: Collection) -> None:
     point, (x_axis, y_axis), ((x1, y1), (x2, y2)) = collection.reference_point, collection.surface, collection.area
     longitude, latitude, height = (float(v) for v in wgs84.geodetic(point))
     scene["EarthModel"] = "WGS_84"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import IO, Any
@@ -12,7 +13,7 @@ import numpy as np
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.errors import warn
 from ..formats import Make, T
-from ..sarkit_library import Element, Reader, Refused, made_of, opened, parsing, text_of
+from ..sarkit_library import Element, FileRows, Reader, Refused, made_of, opened, parsing, text_of
 from ..sarkit_library import library as sarkit_module
 from ._channels import Channel, channels_of, chosen
 from ._domains import baseband, n_frequencies
@@ -23,7 +24,8 @@ SPACE = "http://api.nsgreg.nga.mil/schema/cphd/"
 # Per-vector parameters that must be finite; positive where True
 NEEDED = {"TxTime": False, "TxPos": False, "RcvPos": False, "SRPPos": False, "TxVel": False, "RcvVel": False}
 NEEDED |= {"FX1": True, "FX2": True, "TOA1": False, "TOA2": False, "SC0": False, "SCSS": True, "aFDOP": False}
-COUPLING = 0.1  # of a range resolution: a shift from which on the coupling of range and Doppler is told
+NEEDED |= {"aFRR1": False, "aFRR2": False}
+COUPLING = 0.1, 1.0  # cycles over the band, range resolutions: coupling of range and Doppler that is told, and refused
 NEGLIGIBLE = 0.01  # cycles of phase: 0.16 mm of range at 10 GHz
 ALL_ZERO = ("TxPos", "RcvPos", "SRPPos")  # positions at the centre of the Earth: a file that was not filled in
 
@@ -45,17 +47,23 @@ def load(
             root = reader.metadata.xmltree.getroot()
             _check_kind(root)
             selection = chosen(channels_of(root), channel, polarization)
-            area = _image_area(library, reader.metadata.xmltree)
+            area = image_area(library, reader.metadata.xmltree)
             parts = [_rows(reader, file, root, each, area) for each in selection]
             coupling = max(part.pop("coupling") for part in parts)
-            fields = {field: _joined([part[field] for part in parts]) for field in parts[0]}
+            if coupling > COUPLING[1]:
+                raise Refused(
+                    "has coupled range and Doppler (aFRR1, aFRR2), which sarcl does not correct: targets in corners "
+                    f"of its image area would be moved or blurred by {coupling:.2g} range resolutions; have it written "
+                    "without the coupling, or for a smaller area"
+                )
+            fields = {field: joined([part[field] for part in parts]) for field in parts[0]}
             if np.array_equal(fields["rx"], fields["tx"]):
                 fields["rx"] = None
-            fields |= {"image_area": area, "metadata": _text(reader)}
-        if coupling > COUPLING:
+            fields |= {"image_area": area, "metadata": text(reader)}
+        if coupling > COUPLING[0]:
             warn(
-                f"{name}: range and Doppler are coupled (aFRR1), which is not corrected: targets in the corners of the "
-                f"image area are moved by {coupling:.1%} of the range resolution"
+                f"{name}: range and Doppler are coupled (aFRR1, aFRR2), which is not corrected: targets in the corners "
+                f"of the image area are moved or blurred by {coupling:.1%} of the range resolution"
             )
         return made_of(make, "phase history", fields, name)
 
@@ -68,12 +76,7 @@ def _reader(library: ModuleType, file: IO[bytes]) -> Reader:
     kind, keys = library.read_file_header(head)
     if kind.strip() not in ("CPHD/1.0.1", "CPHD/1.1.0"):
         raise Refused(f"is {kind.strip()!r:.40}; sarcl reads CPHD/1.0.1 and CPHD/1.1.0")
-    for block in ("XML", "PVP", "SIGNAL"):
-        first, size = int(keys[f"{block}_BLOCK_BYTE_OFFSET"]), int(keys[f"{block}_BLOCK_SIZE"])
-        if first < 0 or size < 0 or first + size > end:
-            raise Refused(
-                f"is truncated: its {block} block ends at byte {first + size}, the file at {end}; copy it again"
-            )
+    check_blocks(keys, ("XML", "PVP", "SIGNAL"), end)
     file.seek(0)
     reader = library.Reader(file)
     root = reader.metadata.xmltree.getroot()
@@ -92,6 +95,16 @@ def _reader(library: ModuleType, file: IO[bytes]) -> Reader:
                     f"is damaged: its {array} array of channel {text_of(each, 'Identifier')!r} leaves its block"
                 )
     return reader
+
+
+def check_blocks(keys: Mapping[str, str], blocks: Sequence[str], end: int) -> None:
+    """Refused names a block, of those that the header of a file of `end` bytes describes, that is not all there."""
+    for block in blocks:
+        first, size = int(keys[f"{block}_BLOCK_BYTE_OFFSET"]), int(keys[f"{block}_BLOCK_SIZE"])
+        if first < 0 or size < 0 or first + size > end:
+            raise Refused(
+                f"is truncated: its {block} block ends at byte {first + size}, the file at {end}; copy it again"
+            )
 
 
 def _check_kind(root: Element) -> None:
@@ -166,8 +179,8 @@ def _rows(reader: Reader, file: IO[bytes], root: Element, channel: Channel, area
 
 
 def _coupling(pvp: np.ndarray, area: np.ndarray) -> float:
-    """Largest shift in the corners of the image area by aFRR1, in range resolutions c/(2 B): aFRR1 dv B."""
-    if not pvp["aFRR1"].any():
+    """Largest shift and blur in the corners of the image area, in c/(2 B): aFRR1 dv B and aFRR2 dv B^2/4 added up."""
+    if not (pvp["aFRR1"].any() or pvp["aFRR2"].any()):
         return 0.0
     corners = [area[0] + i * area[1] + j * area[2] for i in (-1, 1) for j in (-1, 1)]
 
@@ -176,8 +189,9 @@ def _coupling(pvp: np.ndarray, area: np.ndarray) -> float:
         lines = [(pvp[f"{end}Pos"] - points, pvp[f"{end}Vel"]) for end in ("Tx", "Rcv")]
         return np.mean([np.einsum("ij,ij->i", v, r) / np.linalg.norm(r, axis=1) for r, v in lines], axis=0)
 
-    shift = [np.abs(pvp["aFRR1"] * (pvp["FX2"] - pvp["FX1"]) * (rate(x) - rate(pvp["SRPPos"]))).max() for x in corners]
-    return float(np.nanmax(shift))
+    band = pvp["FX2"] - pvp["FX1"]
+    cycles = np.abs(pvp["aFRR1"] * band) + np.abs(pvp["aFRR2"] * band**2 / 4)
+    return float(max((cycles * np.abs(rate(x) - rate(pvp["SRPPos"]))).max() for x in corners))
 
 
 def _scale(pvp: np.ndarray) -> np.ndarray:
@@ -222,16 +236,16 @@ def _check_parameters(pvp: np.ndarray, vectors: np.ndarray, channel: Channel, ro
             )
 
 
-def _joined(values: list[Any]) -> Any:
+def joined(values: list[Any]) -> Any:
     """Rows of all channels; samples as a list of their sources."""
-    if isinstance(values[0], SignalRows):
+    if isinstance(values[0], FileRows):
         if len({rows.shape[1] for rows in values}) > 1:
-            raise Refused("has channels of different bands, by time of arrival; give channel= or polarization=")
+            raise Refused("has channels of different bands; give channel= or polarization=")
         return values
     return np.concatenate(values) if isinstance(values[0], np.ndarray) else values[0]
 
 
-def _image_area(library: ModuleType, tree: Element) -> np.ndarray:
+def image_area(library: ModuleType, tree: Element) -> np.ndarray:
     """Centre of the image area, and from there to the middles of its sides along IAX and IAY, m (3, 3)."""
     root = tree.getroot()
     names = [[f"SceneCoordinates/ImageArea/{corner}/{axis}" for axis in "XY"] for corner in ("X1Y1", "X2Y2")]
@@ -263,7 +277,7 @@ def _in_metres(root: Element, corners: np.ndarray) -> np.ndarray:
     return np.asarray((corners - place) * [float(text_of(grid, f"{side}/{name}Spacing")) for side, name in sides])
 
 
-def _text(reader: Reader) -> str:
+def text(reader: Reader) -> str:
     """The XML of the file."""
     from lxml import etree
 

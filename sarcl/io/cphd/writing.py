@@ -134,7 +134,8 @@ def _parameters(collection: Collection, library: ModuleType, rows: np.ndarray) -
     advance = collection.advance[rows]
     pvp["TOA1"], pvp["TOA2"] = advance - half, advance + half
     if collection.domain == "FX":
-        pvp["FX1"], pvp["FX2"], pvp["SC0"], pvp["SCSS"] = low, low + (n - 1) * step, low, step
+        beyond = step / 2 if n == 1 else 0.0  # one sample is a band of a step: FX2 must exceed FX1
+        pvp["FX1"], pvp["FX2"], pvp["SC0"], pvp["SCSS"] = low - beyond, low + (n - 1) * step + beyond, low, step
     else:
         spacing = 1 / (collection.n_stored * step)
         pvp["FX1"], pvp["FX2"] = low - step / 2, low + (n - 0.5) * step

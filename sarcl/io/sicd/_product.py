@@ -71,11 +71,20 @@ def tree_of(library: ModuleType, product: Product) -> Element:
     tree = root.elem.getroottree()
     root.elem.append(library.compute_scp_coa(tree))
     _check_order(root.elem)
+    if product.backscatter is not None:
+        assert product.gain is not None
+        root["Radiometric"]["RCSSFPoly"] = np.array([[product.gain**-2.0]])  # |pixel/gain|^2 is a cross section, m^2
+        if is_ground:  # cells of other planes are none of the ground
+            sigma = product.backscatter
+            slope, graze = (np.radians(root["SCPCOA"][f"{name}Ang"]) for name in ("Slope", "Graze"))
+            root["Radiometric"]["SigmaZeroSFPoly"] = sigma
+            root["Radiometric"]["BetaZeroSFPoly"] = sigma / np.cos(slope)
+            root["Radiometric"]["GammaZeroSFPoly"] = sigma / np.sin(graze)
     return tree
 
 
 def _check_order(root: Element) -> None:
-    """The SCPCOA element, which follows from the others, stands last: nothing comes after it here."""
+    """The SCPCOA element, which follows from the others, stands last of them."""
     assert root[-1].tag.endswith("SCPCOA")
 
 

@@ -88,6 +88,7 @@ class Product:
     time_coa   time at which a pixel is seen, a polynomial by image coordinates
     duration   of the collection;  processed  first and last pulse;  band  lowest and highest frequency, Hz
     names      texts by element;  gain, window   of the image, where they have one value
+    backscatter   of power: a polynomial by image coordinates of the factor to a backscatter coefficient, or None
     """
 
     order: Order
@@ -103,6 +104,7 @@ class Product:
     names: dict[str, str]
     gain: float | None
     window: str | None
+    backscatter: np.ndarray | None
     version: str
 
     def blocks(self) -> Iterator[tuple[int, int]]:

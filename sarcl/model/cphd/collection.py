@@ -33,6 +33,7 @@ class CphdOptions(NamedTuple):
     domain: str
     sgn: int
     version: str
+    kind: str = "CPHD"
 
 
 def collection_of(raw: PhaseHistory, options: CphdOptions) -> Collection:
@@ -41,9 +42,9 @@ def collection_of(raw: PhaseHistory, options: CphdOptions) -> Collection:
     validation.choice("version", options.version, ("1.0.1", "1.1.0"))
     if options.sgn not in (-1, 1) or isinstance(options.sgn, bool):
         raise ValueError(f"sgn is {options.sgn!r}; give -1, or +1: then the samples are conjugated")
-    _check_samples(raw)
-    words, is_local = Words("CPHD", options.metadata, (*REQUIRED, *OPTIONAL, *OTHERS)), options.origin is not None
-    corner, local = frame(raw.tx[0], "CPHD", options.origin, options.axes)
+    _check_samples(raw, options.kind)
+    words, is_local = Words(options.kind, options.metadata, (*REQUIRED, *OPTIONAL, *OTHERS)), options.origin is not None
+    corner, local = frame(raw.tx[0], options.kind, options.origin, options.axes)
     time = per_row(raw, words, "time", "TxTime", ())
     velocities = [
         per_row(raw, words, name, key, (3,)) @ local
@@ -83,13 +84,20 @@ def collection_of(raw: PhaseHistory, options: CphdOptions) -> Collection:
     )
 
 
-def _check_samples(raw: PhaseHistory) -> None:
-    """ValueError for what CPHD cannot say of samples."""
+def _check_samples(raw: PhaseHistory, kind: str) -> None:
+    """ValueError for what a file of a kind cannot say of samples."""
     if not raw.compressed:
-        raise ValueError("the echoes are not compressed, and CPHD holds compressed ones; call sarcl.compress first")
+        raise ValueError(
+            f"the echoes are not compressed, and {kind} is written of compressed ones; call sarcl.compress first"
+        )
     if raw.weight is not None and not (raw.weight == 1).all():
         raise ValueError(
-            "weight differs from 1, which CPHD has no place for; give dataclasses.replace(raw, weight=None)"
+            f"weight differs from 1, which {kind} has no place for; give dataclasses.replace(raw, weight=None)"
+        )
+    if raw.array is not None and raw.tx_channel is None and (raw.array.positions.any() or raw.array.offsets.any()):
+        raise ValueError(
+            f"the rows are sums over the {raw.array.n} elements of an array, and a {kind} vector has one phase "
+            "centre and one carrier; give sarcl.echo channels='separated', or save sarcl.map_aperture(raw, 'channels')"
         )
 
 
@@ -152,7 +160,9 @@ def _surface(
 
 
 def _channels(raw: PhaseHistory, words: Words, time: np.ndarray, version: str) -> tuple[ChannelRows, ...]:
-    """Rows of equal transmitting and receiving channel and polarisation, in order; their times must increase."""
+    """Rows of equal transmitting and receiving channel, polarisation, and carrier of an array, in order; their times
+    must increase.
+    """
     letters = POLARIZATIONS | (LATER if version == "1.1.0" else {})
     if raw.polarization is None:
         pair = words.text("TxPol"), words.text("RcvPol")
@@ -170,15 +180,17 @@ def _channels(raw: PhaseHistory, words: Words, time: np.ndarray, version: str) -
         )
     zeros = np.zeros(raw.n_rows, int)
     tx, rx = (zeros if each is None else each for each in (raw.tx_channel, raw.rx_channel))
-    rows_of: dict[tuple[int, int, str], list[int]] = {}
-    for row, key in enumerate(zip(tx.tolist(), rx.tolist(), labels.tolist(), strict=True)):
+    # a plan gives an element other carriers from some pulse on; without an array rows may differ in each frequency
+    carrier = np.zeros(raw.n_rows) if raw.array is None else raw.frequency
+    rows_of: dict[tuple[int, int, str, float], list[int]] = {}
+    for row, key in enumerate(zip(tx.tolist(), rx.tolist(), labels.tolist(), carrier.tolist(), strict=True)):
         rows_of.setdefault(key, []).append(row)
     channels = []
     for number, (key, members) in enumerate(rows_of.items()):
         rows = np.array(members)
         if not (np.diff(time[rows]) > 0).all():
             raise ValueError(
-                f"times of the rows of channel {key} do not increase, as CPHD wants; sort the rows by time"
+                f"times of the rows of channel {key[:3]} do not increase, as CPHD wants; sort the rows by time"
             )
         channels.append(ChannelRows(f"{number + 1}", names[key[2]], (key[0], key[1]), rows))
     return tuple(channels)

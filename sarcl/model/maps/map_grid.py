@@ -113,5 +113,16 @@ def on_map(
     return projection.text, np.array(axes[:4]), wgs84.ecef(longitude, latitude, heights)
 
 
+def placed(crs: str, map_axes: np.ndarray, shape: tuple[int, int], height: float) -> tuple[str, Floats]:
+    """The CRS as text, and Earth-fixed positions, m (rows, columns, 3), of the pixels of a map at one height, m."""
+    projection = MapProjection.of(crs)
+    validation.room(f"positions of {shape[0]} x {shape[1]} pixels", 24.0 * shape[0] * shape[1], "read a smaller map")
+    west, south, dx, dy = map_axes.tolist()
+    x, y = MapAxes(west, south, dx, dy, shape).rows(0, shape[0])
+    longitude, latitude = projection.places(x, y)
+    projection.check_reach(_border(longitude), _border(latitude))
+    return projection.text, wgs84.ecef(longitude, latitude, height)
+
+
 def _border(values: Floats) -> Floats:
     return np.concatenate([values[0], values[-1], values[:, 0], values[:, -1]])

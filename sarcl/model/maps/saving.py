@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 
 VALUES = ("complex", "amplitude", "db")
 LAYERS = ("layover", "shadow", "incidence")
+NODES = 65  # along each side of an image, whose heights the file names
+HEIGHT_DIGITS = 6  # of a height in metres: those of one height differ by the rounding of Earth-fixed positions
 POINTS = 16_384  # positions whose layers are computed at once
 
 
@@ -168,6 +170,11 @@ class _MapPicture:
             "SOFTWARE": f"sarcl {__version__}",
             "VALUE": f"{self.value} over gain: a unit point has modulus 1; its square is a radar cross section, m^2",
         }
+        ends = (np.unique(np.linspace(0, n - 1, NODES).astype(int)) for n in image.shape)
+        nodes = image.grid.positions_of(tuple(np.meshgrid(*ends, indexing="ij"))).reshape(-1, 3)
+        heights = np.round(wgs84.geodetic(nodes[np.isfinite(nodes[:, 0])])[2], HEIGHT_DIGITS)
+        numbers = {"AXES": self.axes[:4], "HEIGHTS": (heights.min(), heights.max())}
+        tags |= {name: " ".join(repr(float(v)) for v in values) for name, values in numbers.items()}
         names = ("frequency", "band", "time", "tx", "rx", "tx_velocity", "rx_velocity", "window", "polarization")
         for name in names:
             field = getattr(image, name)

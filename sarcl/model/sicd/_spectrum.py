@@ -83,8 +83,27 @@ class Aperture:
         slopes = self.slopes(point[None], axes)[0, rows]
         share = (np.arange(WAVES[1]) + 0.5) / WAVES[1]
         frequency = self.low[rows, None] + (self.high - self.low)[rows, None] * share
-        weight = _window(windows[1], len(rows))[:, None] * _window(windows[0], WAVES[1])
+        weight = window_weights(windows[1], len(rows))[:, None] * window_weights(windows[0], WAVES[1])
         return np.array([_width(frequency * slopes[:, i, None], weight) for i in (0, 1)])
+
+    def cells(self, points: np.ndarray, axes: np.ndarray, windows: tuple[str, str]) -> np.ndarray:
+        """Areas, m^2 (m,), of the resolution cells at points, m (m, 3), that all rows see, on the plane of axes (2, 3).
+
+        The integral of |h|^2, h the response over its peak. By Parseval sum w^2/dA over (sum w)^2, with dA the area of
+        spatial frequencies of a sample, f df |g x dg|, g the slopes and dg their change from row to row. NaN where
+        rows have no extent. windows  as in `widths`
+        """
+        order = np.argsort(self.time, kind="stable")
+        slopes = self.slopes(points, axes)[:, order]
+        change = np.gradient(slopes, axis=1)
+        width = (self.high - self.low)[order, None] / WAVES[1]
+        frequency = self.low[order, None] + width * (np.arange(WAVES[1]) + 0.5)
+        turn = np.abs(slopes[..., 0] * change[..., 1] - slopes[..., 1] * change[..., 0])
+        weight = window_weights(windows[1], len(order))[:, None] * window_weights(windows[0], WAVES[1])
+        per_row = (weight**2 / (frequency * width)).sum(axis=1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            areas = (per_row / turn).sum(axis=1) / weight.sum() ** 2
+        return np.where(np.isfinite(areas), areas, np.nan)
 
 
 def _width(k: np.ndarray, weight: np.ndarray) -> float:
@@ -99,7 +118,7 @@ def _width(k: np.ndarray, weight: np.ndarray) -> float:
     return float(2 * (below - 1 + share) * x[1])
 
 
-def _window(words: str, n: int) -> np.ndarray:
+def window_weights(words: str, n: int) -> np.ndarray:
     """Weights (n,) of a window in words, such as "hamming" or "taylor 35 5"."""
     from scipy.signal import windows
 

@@ -20,7 +20,7 @@ from ...io.sarkit_library import library as sarkit_module
 from ...io.sicd.writing import Direction, Order, Product, Tracks
 from ..cphd.words import LATER, POLARIZATIONS, Words, frame, per_row
 from . import _polynomials
-from ._spectrum import MOST_ROWS, Aperture
+from ._spectrum import MOST_ROWS, Aperture, window_weights
 
 if TYPE_CHECKING:
     from ..image import Image
@@ -33,6 +33,8 @@ OTHERS = ("IlluminatorName", "CollectionStart", "TxPol", "RcvPol", "TxTime", "Im
 SAME = 1.0  # m: farther from where the sender has moved on to, the receiver is on another platform
 FARTHEST = 0.3  # m, by which a polynomial may miss a track
 FIT = 1e-3, 0.02  # of a bandwidth or dwell: error at which a fit stops, and that is the most
+UNKNOWN = 1.0  # gain of an image that was not made by sarcl
+GAIN = 0.05  # of a gain with windows, by which sums of few weights differ from their integrals
 LEAST_SHARE = 0.5  # of the largest bandwidth in an image, which the file gives for all of its pixels
 
 
@@ -83,6 +85,7 @@ def product_of(
     order, directions = _order(image, local, scp, polynomial.polyval(float(np.median(clock)), tracks.arp))
     aperture = _aperture(image, raw, clock, tx, rx, local)
     rows, columns, coa = _directions(image, aperture, scp, (order, directions), words)
+    places = _polynomials.nodes(*_corners(order, (rows.spacing, columns.spacing)))
     delay = (np.linalg.norm(tx - scp, axis=1) + np.linalg.norm(rx - scp, axis=1)) / SPEED_OF_LIGHT
     return Product(
         order=order,
@@ -98,6 +101,7 @@ def product_of(
         names=names,
         gain=None if isinstance(image.gain, np.ndarray) else image.gain,
         window=image.window,
+        backscatter=_backscatter(image, aperture, scp, directions, places),
         version=release,
     )
 
@@ -150,18 +154,71 @@ def _check_image(image: Image) -> None:
         raise ValueError("SICD holds complex images, and this one is real (multilooked); save it before, or as .h5")
 
 
+def _corners(order: Order, spacing: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
+    """Least and largest image coordinates, m (2,), of the file's pixels."""
+    low = -np.array(order.scp_pixel) * spacing
+    return low, low + (np.array(order.shape) - 1) * spacing
+
+
+def _windows(image: Image) -> tuple[str, str]:
+    """Windows over the frequencies and over the rows, in words."""
+    across, _, along = (image.window or "none").partition(" x ")
+    return across, along or across
+
+
+def _backscatter(
+    image: Image, aperture: Aperture, scp: np.ndarray, axes: np.ndarray, places: tuple[np.ndarray, np.ndarray]
+) -> np.ndarray | None:
+    """1/(gain^2 cell area), a polynomial by image coordinates: power of a pixel times it is a backscatter coefficient.
+
+    None where the gain is not known, varies or is that of rows that saw parts of the image, or the window has no name.
+    """
+    if isinstance(image.gain, np.ndarray) or image.gain == UNKNOWN or image.aperture is not None:
+        return None
+    try:
+        values = [1 / (image.gain**2 * aperture.cells(scp + p @ axes, axes, _windows(image))) for p in places]
+    except (ValueError, IndexError, TypeError):  # a window without a name
+        return None
+    if not all(np.isfinite(each).all() for each in values):
+        return None
+    known = {id(p): each for p, each in zip(places, values, strict=True)}
+    fit, error = _polynomials.surface(places, lambda p: known[id(p)], FIT[0] * float(values[0].min()))
+    return fit if error <= FIT[1] * values[0].min() else None
+
+
+def _check_gain(image: Image, raw: PhaseHistory) -> None:
+    """ValueError where the gain of an image is not the sum of the weights of the echoes."""
+    if isinstance(image.gain, np.ndarray) or image.gain == UNKNOWN:
+        return
+    across, along = _windows(image)
+    try:
+        rows, samples = window_weights(along, raw.n_rows), window_weights(across, raw.n_samples)
+    except (ValueError, IndexError, TypeError):  # a window without a name
+        return
+    weight = 1.0 if raw.weight is None else raw.weight
+    total = float((weight * rows).sum() * samples.sum())
+    if abs(image.gain - total) > (GAIN if image.window else 1e-6) * total:
+        raise ValueError(
+            f"image.gain is {image.gain:g}, and {raw.n_rows} rows of {raw.n_samples} samples of collection have "
+            f"{total:g}; give the phase history that the image was made of, with all of its rows"
+        )
+
+
 def _check_collection(image: Image, raw: PhaseHistory) -> None:
     """ValueError where an image was certainly made of other echoes."""
     middle = raw.n_rows // 2
     half = raw.frequency_step / 2
     band = (raw.frequency - half).min(), (raw.frequency + (raw.n_samples - 1) * raw.frequency_step + half).max()
     pairs = [("tx", image.tx, raw.tx[middle]), ("rx", image.rx, raw.rx[middle]), ("band", image.band, np.array(band))]
+    if raw.time is not None:
+        pairs.append(("time", image.time, np.array([raw.time.min(), raw.time.max()])))
     for name, one, other in pairs:
         if one is not None and not np.allclose(one, other, rtol=1e-9, atol=1e-3):
             raise ValueError(
-                f"image.{name} is {one}, and the middle of collection has {other}; give the phase history that the "
+                f"image.{name} is {one}, and collection has {other}; give the phase history that the "
                 "image was made of, with the same rows and samples"
             )
+    _check_gain(image, raw)
 
 
 def _tracks(
@@ -255,9 +312,7 @@ def _directions(
     order, axes = turned
     assert image.grid.spacing is not None
     spacing = image.grid.spacing[::-1] if order.is_transposed else image.grid.spacing
-    low = -np.array(order.scp_pixel) * spacing
-    high = low + (np.array(order.shape) - 1) * spacing
-    places = _polynomials.nodes(low, high)
+    places = _polynomials.nodes(*_corners(order, spacing))
     spans = {id(p): aperture.spans(scp + p @ axes, axes) for p in places}
     every = np.concatenate(list(spans.values()))
     if np.isnan(every).any():
@@ -308,9 +363,8 @@ def _fit(places: tuple[np.ndarray, np.ndarray], values: Any, scale: float, what:
 
 def _widths(image: Image, aperture: Aperture, scp: np.ndarray, axes: np.ndarray) -> np.ndarray:
     """Half-power widths of a point response at the centre, m (2,), along rows and columns."""
-    across, _, along = (image.window or "none").partition(" x ")
     try:
-        return aperture.widths(scp, axes, (across, along or across))
+        return aperture.widths(scp, axes, _windows(image))
     except (ValueError, IndexError, TypeError) as exc:
         raise ValueError(
             f"the width of a point response with the window {image.window!r} is not known ({exc}); give "

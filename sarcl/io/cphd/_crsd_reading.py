@@ -1,0 +1,246 @@
+"""A CRSD file of the echoes of chirps as the fields of a compressed phase history. Equations: _pulses.py."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from types import ModuleType
+from typing import IO, Any
+
+import numpy as np
+
+from ...base.constants import SPEED_OF_LIGHT
+from ..formats import Make, T
+from ..sarkit_library import Element, FileRows, Reader, Refused, made_of, opened, parsing, text_of
+from ..sarkit_library import library as sarkit_module
+from ._channels import ENDS, Channel, chosen
+from ._pulses import Records
+from ._reading import HEADER_BYTES, check_blocks, image_area, joined, text
+from .crsd_writing import since
+
+FINITE = ("TxTime", "TxPos", "TxVel", "RcvStart", "RcvPos", "RcvVel", "FRCV1", "FRCV2", "RefPhi0", "PhiX0")
+POSITIVE = ("TXmt", "FxFreq0", "RefFreq", "AmpSF", "FRCV1")
+STEPS = 4  # iterations of the time at which the echo of the reference point arrives: 1e-5 of the error before, each
+
+
+def load(
+    source: Path | IO[bytes], make: Make[T], channel: str | int | None = None, polarization: str | None = None
+) -> T:
+    """make("phase history", fields) of a CRSD file; samples stay in it, and are compressed when they are read.
+
+    source, channel, polarization   as of CPHD
+    ValueError, which names the file: truncated, damaged, another version or kind, pulses that are no chirps, dechirped
+    or compressed signals, parameters that are not finite, channels that do not fit. ImportError without sarkit.
+    """
+    library = sarkit_module("crsd")
+    with opened(source) as (file, name):
+        with parsing(name):
+            reader, first = _reader(library, file)
+            tree = reader.metadata.xmltree
+            selection = chosen(_channels(tree.getroot()), channel, polarization)
+            parts = [_rows(reader, file, first, each) for each in selection]
+            fields = {field: joined([part[field] for part in parts]) for field in parts[0] if field != "waveform"}
+            pulses = [part["waveform"] for part in parts]
+            if all(each == pulses[0] for each in pulses):
+                fields["waveform"] = pulses[0]
+            if np.abs(fields["rx"] - fields["tx"]).max() < 4 * np.spacing(np.abs(fields["tx"]).max()):
+                fields["rx"] = None
+            fields |= {"image_area": image_area(library, tree), "metadata": text(reader)}
+        return made_of(make, "phase history", fields, name)
+
+
+def _reader(library: ModuleType, file: IO[bytes]) -> tuple[Reader, int]:
+    """sarkit's reader of an open file with all its blocks, and the byte at which its signals begin."""
+    end = file.seek(0, io.SEEK_END)
+    file.seek(0)
+    kind, keys = library.read_file_header(io.BytesIO(file.read(HEADER_BYTES)))
+    if kind.strip() != "CRSDsar/1.0":
+        raise Refused(f"is {kind.strip()!r:.40}; sarcl reads CRSDsar/1.0")
+    check_blocks(keys, ("XML", "SUPPORT", "PPP", "PVP", "SIGNAL"), end)
+    file.seek(0)
+    reader = library.Reader(file)
+    root = reader.metadata.xmltree.getroot()
+    if root.find("{*}Data/{*}Receive/{*}SignalCompression") is not None:
+        raise Refused("has a compressed signal, which CRSD leaves to each producer; have it written uncompressed")
+    if text_of(root, "TxSequence/TxWFType") != "LFM":
+        raise Refused(f"has pulses of type {text_of(root, 'TxSequence/TxWFType')!r:.20}; sarcl reads chirps, LFM")
+    row = library.binary_format_string_to_dtype(text_of(root, "Data/Receive/SignalArrayFormat")).itemsize
+    for each in root.findall("{*}Data/{*}Receive/{*}Channel"):
+        n, size = (int(text_of(each, f"Num{of}")) for of in ("Vectors", "Samples"))
+        at = int(text_of(each, "SignalArrayByteOffset"))
+        if at < 0 or at + n * size * row > int(keys["SIGNAL_BLOCK_SIZE"]):
+            raise Refused(f"is damaged: its Signal array of channel {text_of(each, 'ChId')!r} leaves its block")
+    return reader, int(keys["SIGNAL_BLOCK_BYTE_OFFSET"])
+
+
+def _parameters(root: Element, group: str, name: str) -> Element:
+    return next(each for each in root.findall(f"{{*}}{group}/{{*}}Parameters") if text_of(each, "Identifier") == name)
+
+
+def _channels(root: Element) -> list[Channel]:
+    """All channels; their numbers of antennas are those that sarcl wrote, or count their phase centres."""
+    centres: tuple[dict[str, int], dict[str, int]] = ({}, {})
+    channels = []
+    for size in root.findall("{*}Data/{*}Receive/{*}Channel"):
+        name = text_of(size, "ChId")
+        received = _parameters(root, "Channel", name)
+        sent = _parameters(root, "TxSequence", text_of(received, "SARImage/TxId"))
+        known = {each.get("name"): each.text or "" for each in received.findall("{*}Parameter")}
+        ends = text_of(sent, "TxAPCId"), text_of(received, "RcvAPCId")
+        numbers = [
+            int(known.get(key, ids.setdefault(end, len(ids))))
+            for key, ids, end in zip(ENDS, centres, ends, strict=True)
+        ]
+        kinds = text_of(sent, "TxPolarization/PolarizationID"), text_of(received, "RcvPolarization/PolarizationID")
+        channels.append(
+            Channel(name, int(text_of(size, "NumVectors")), int(text_of(size, "NumSamples")), kinds, *numbers)
+        )
+    if not channels or min(min(c.n_vectors, c.n_samples) for c in channels) < 1:
+        raise ValueError("it has no channel with vectors and samples")
+    return channels
+
+
+def _rows(reader: Reader, file: IO[bytes], first: int, channel: Channel) -> dict[str, Any]:
+    """Fields of the rows of a channel, but those without a signal or a pulse."""
+    root = reader.metadata.xmltree.getroot()
+    received = _parameters(root, "Channel", channel.name)
+    pvp = reader.read_pvps(channel.name)
+    pvp = pvp.astype(pvp.dtype.newbyteorder("="))
+    vectors = np.flatnonzero((pvp["SIGNAL"] == 1) & (pvp["TxPulseIndex"] >= 0))
+    if not len(vectors):
+        raise Refused(f"has no vector with a signal of a pulse in channel {channel.name!r}; give another channel=")
+    pvp = pvp[vectors]
+    ppp = reader.read_ppps(text_of(received, "SARImage/TxId"))
+    ppp = ppp.astype(ppp.dtype.newbyteorder("="))[pvp["TxPulseIndex"]]
+    _check(pvp, ppp, vectors, channel)
+    rate = float(text_of(received, "Fs"))
+    tx, srp = np.array(ppp["TxPos"]), np.array([float(text_of(received, f"RcvRefPoint/ECF/{axis}")) for axis in "XYZ"])
+    after = since(pvp["RcvStart"], ppp["TxTime"])
+    rx = np.array(pvp["RcvPos"])
+    for _ in range(STEPS):  # where the receiver is when the echo of the reference point arrives
+        delay = (np.linalg.norm(tx - srp, axis=1) + np.linalg.norm(srp - rx, axis=1)) / SPEED_OF_LIGHT
+        rx = pvp["RcvPos"] + pvp["RcvVel"] * (delay - after)[:, None]
+    pulse, sweep = float(ppp["TXmt"][0]), float(ppp["FxRate"][0])
+    late = after + channel.n_samples // 2 / rate - delay  # of the middle of the record
+    delay += np.where(np.abs(late) <= 1.5 / rate, 0.0, late)
+    records = Records(rate, channel.n_samples, pulse, sweep, after - delay, np.zeros(0))
+    if records.n_profile < 1:
+        raise Refused(f"has records of {channel.n_samples / rate:g} s in channel {channel.name!r}, shorter than pulses")
+    n = int(np.clip(np.rint(((pvp["FRCV2"] - pvp["FRCV1"]) / records.step).max()), 1, records.n_profile))
+    frequency = (pvp["FRCV1"] + pvp["FRCV2"]) / 2 - (n - 1) / 2 * records.step
+    # the mixer follows RefFreq, and the filter of chirps is about FxFreq0
+    offset, carrier = frequency - ppp["FxFreq0"], np.array(ppp["FxFreq0"])
+    records = Records(rate, channel.n_samples, pulse, sweep, records.start, offset)
+    cycles = since(pvp["RefPhi0"], ppp["PhiX0"]) - pvp["RefFreq"] * records.start
+    rows = CompressedRows(file, first + _offset(root, channel), channel, vectors, records, (n, _dtype(root)))
+    rows.phase = np.exp(2j * np.pi * (cycles - np.rint(cycles)))
+    rows.mixer, rows.amplitude = np.array(pvp["RefFreq"]) - carrier, np.array(pvp["AmpSF"])
+    k = len(vectors)
+    return {
+        "samples": rows,
+        "frequency": np.array(frequency),
+        "frequency_step": np.full(k, records.step),
+        "tx": tx,
+        "rx": rx,
+        "reference_range": SPEED_OF_LIGHT * delay / 2,
+        "time": np.array(ppp["TxTime"]["Int"] + ppp["TxTime"]["Frac"]),
+        "tx_channel": np.full(k, channel.tx_channel),
+        "rx_channel": np.full(k, channel.rx_channel),
+        "polarization": None if channel.polarization is None else np.full(k, channel.polarization),
+        "tx_velocity": np.array(ppp["TxVel"]),
+        "rx_velocity": np.array(pvp["RcvVel"]),
+        "compressed": True,
+        "waveform": {
+            "center": float((ppp["FX1"] + ppp["FX2"])[0] / 2),
+            "bandwidth": float((ppp["FX2"] - ppp["FX1"])[0]),
+            "duration": pulse,
+            "kind": "chirp" if sweep > 0 else "down-chirp",
+        },
+    }
+
+
+def _offset(root: Element, channel: Channel) -> int:
+    sizes = root.findall("{*}Data/{*}Receive/{*}Channel")
+    return int(text_of(next(each for each in sizes if text_of(each, "ChId") == channel.name), "SignalArrayByteOffset"))
+
+
+def _dtype(root: Element) -> np.dtype[Any]:
+    """Type of the samples."""
+    kind = sarkit_module("crsd").binary_format_string_to_dtype(text_of(root, "Data/Receive/SignalArrayFormat"))
+    return np.dtype(kind.newbyteorder(">"))
+
+
+def _check(pvp: np.ndarray, ppp: np.ndarray, vectors: np.ndarray, channel: Channel) -> None:
+    """Refused names a parameter, and the first vector, that is wrong."""
+    for name in (*FINITE, *POSITIVE):
+        values = (ppp if name in (ppp.dtype.names or ()) else pvp)[name]
+        if values.dtype.names:
+            values = values["Frac"]
+        values = values.reshape(len(pvp), -1)
+        is_bad = ~np.isfinite(values).all(axis=1) | ((values <= 0).any(axis=1) if name in POSITIVE else False)
+        if is_bad.any():
+            i = int(np.argmax(is_bad))
+            raise Refused(
+                f"has {name} = {values[i].tolist()} in vector {int(vectors[i])} of channel {channel.name!r}, wanted "
+                f"{'positive' if name in POSITIVE else 'finite'}: it is damaged, or was not filled in"
+            )
+    if pvp["FICRate"].any() or pvp["DFIC0"].any():
+        raise Refused("has dechirped records (FICRate, DFIC0), which sarcl does not read; have them written without")
+    for name in ("TXmt", "FxRate"):
+        if np.ptp(ppp[name]) or not ppp[name][0] or not np.isfinite(ppp[name][0]):
+            raise Refused(
+                f"has {name} = {ppp[name].min():g} to {ppp[name].max():g} in channel {channel.name!r}, wanted one"
+            )
+    if not (pvp["FRCV1"] < pvp["FRCV2"]).all():
+        raise Refused(f"has FRCV2 not above FRCV1 in channel {channel.name!r}: it is damaged")
+
+
+class CompressedRows(FileRows):
+    """Compressed spectra (n_rows, n), complex64, of the records of one channel; a slice reads its rows.
+
+    phase     factor per row;  mixer  RefFreq - FxFreq0, Hz;  amplitude  AmpSF
+    filename  of the file, where it is one on a disk
+    """
+
+    dtype = np.dtype(np.complex64)
+    phase: np.ndarray
+    mixer: np.ndarray
+    amplitude: np.ndarray
+
+    def __init__(
+        self,
+        file: IO[bytes],
+        first: int,
+        channel: Channel,
+        vectors: np.ndarray,
+        records: Records,
+        kind: tuple[int, np.dtype[Any]],
+    ) -> None:
+        """first  byte of the channel's signal;  kind  frequencies of a row, and the type of samples in the file"""
+        super().__init__(file, "samples", "dataclasses.replace(raw, samples=raw.read(0, raw.n_rows))")
+        self._first, self._channel, self._vectors, self._records, self._kind = first, channel, vectors, records, kind[1]
+        self.shape = (len(vectors), kind[0])
+        name = getattr(file, "name", None)
+        self.filename = name if isinstance(name, str) and self._stamp is not None else None
+
+    def _read(self, low: int, high: int) -> np.ndarray:
+        size = self._channel.n_samples * self._kind.itemsize
+        self._file.seek(self._first + low * size)
+        data = self._file.read((high - low) * size)
+        return np.frombuffer(data, self._kind).reshape(high - low, -1)
+
+    def __getitem__(self, rows: slice) -> np.ndarray:
+        start, stop, _ = rows.indices(self.shape[0])
+        if stop <= start:
+            return np.empty((0, self.shape[1]), self.dtype)
+        vectors, records, part = self._vectors[start:stop], self._records, slice(start, stop)
+        low, high = int(vectors[0]), int(vectors[-1]) + 1
+        values = self._of_file(
+            f"vectors {low} to {high - 1} of channel {self._channel.name!r}", lambda: self._read(low, high)
+        )[vectors - low]
+        if values.dtype.names:
+            values = values["real"].astype(np.float32) + 1j * values["imag"].astype(np.float32)
+        time = records.start[part, None] + np.arange(records.n) / records.rate
+        mix = np.exp(2j * np.pi * self.mixer[part, None] * time) if self.mixer[part].any() else 1.0
+        factor = (self.phase[part] * self.amplitude[part])[:, None]
+        return records.compressed(values * (factor * mix), part, self.shape[1]).astype(np.complex64)
