@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -44,7 +43,6 @@ class PointEchoes:
     """The echoes of the pixels as points: direct or factorised, as `echo` adds them.
 
     predicted_error  relative, for amplitudes with random phases and for equal ones
-    weights          gains of the antenna, or 1
     """
 
     dtype = np.complex64
@@ -71,14 +69,10 @@ class PointEchoes:
         self.plan: PointPlan = prepared.plan(weights, self._view.band, self._inner, 1)
         self.predicted_error = self.plan.predicted_error + gains
 
-    @property
-    def weights(self) -> AntennaWeights:
-        return self._view.weights
-
-    def __call__(self, amplitudes: np.ndarray, weights: AntennaWeights | None = None) -> np.ndarray:
-        """Samples (n_rows, n_samples) complex64 of amplitudes (n,) of all pixels; weights  other gains than its own."""
-        measurement, nodes = self._measurement, np.array([self.weights.frequency])
-        view = self._view if weights is None else replace(self._view, weights=weights)
+    def __call__(self, amplitudes: np.ndarray) -> np.ndarray:
+        """Samples (n_rows, n_samples) complex64 of amplitudes (n,) of all pixels."""
+        measurement, view = self._measurement, self._view
+        nodes = np.array([view.weights.frequency])
         seen = amplitudes if measurement.seen is None else amplitudes[measurement.seen]
         points = Points(self._points.positions, seen)
         samples = np.zeros(measurement.shape, np.complex64)

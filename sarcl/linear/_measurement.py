@@ -20,6 +20,7 @@ from ..model.phase_history import PhaseHistory
 from ..model.waveform import Waveform
 from ..numerics.windows import Window
 from ..opencl.device import DeviceChoice
+from ..scattering.antenna_weights import AntennaWeights
 
 Domain: TypeAlias = ImageGrid | ArrayLike
 SKIPS: tuple[Skip, ...] = (
@@ -119,8 +120,13 @@ class Arguments:
         validation.choice("method", self.method, METHODS)
 
 
-def measurement_of(domain: Domain, like: PhaseHistory, arguments: Arguments) -> Measurement:
-    """The measurement for the arguments of `Echoes`; ValueError or TypeError for arguments that do not fit."""
+def measurement_of(
+    domain: Domain, like: PhaseHistory, arguments: Arguments, aimed: AntennaWeights | None = None
+) -> Measurement:
+    """The measurement for the arguments of `Echoes`; ValueError or TypeError for arguments that do not fit.
+
+    aimed  gains of arguments.antenna that are aimed already: only the places of the antennas are new
+    """
     antenna, beam, wrap = arguments.antenna, arguments.beam, bool(arguments.wrap)
     instance("like", like, PhaseHistory)
     grid = domain if isinstance(domain, ImageGrid) else ImageGrid.points(domain)
@@ -136,7 +142,9 @@ def measurement_of(domain: Domain, like: PhaseHistory, arguments: Arguments) -> 
     task = replace(task, row_weight=np.ones_like(rows), sample_weight=np.ones_like(across))
     if task.antennas.beam is not None and all_lit(task.antennas, grid):
         task = replace(task, antennas=geometry_of(raw, wrap))
-    if antenna is not None:
+    if aimed is not None:
+        task = replace(task, antenna=aimed.at(task.antennas))
+    elif antenna is not None:
         if not is_antenna(antenna):
             raise TypeError(f"antenna is a {type(antenna).__name__}; give an Antenna, or (antenna, aim)")
         center = grid.bounds.mean(axis=0) if grid.center is None else grid.center
