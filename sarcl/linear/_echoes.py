@@ -28,9 +28,9 @@ from ..opencl.memory_budget import budget
 from ..scattering.antenna_weights import AntennaWeights
 from ._autograd import jax_function, rows_of_batch, torch_batch, torch_function
 from ._float32_pair import Image, PointEchoes
-from ._float64_pair import TransposedImage, choice_of
+from ._float64_pair import ROWS, TransposedImage, choice_of
 from ._gradients import KINDS, Gradients, Kind
-from ._measurement import Arguments, Domain, measurement_of
+from ._measurement import Arguments, Domain, RowsAsRead, measurement_of
 
 MOST_ROUNDS = 200  # of the power iteration
 # Errors of both directions are independent: <y, A x> - <A.H y, x> is smaller than they are by the root of the numbers
@@ -193,8 +193,25 @@ class Echoes(_Named):
         return True
 
     def normal(self, x: ArrayLike) -> np.ndarray:
-        """A.H @ A @ x of amplitudes (n,). The samples are in memory meanwhile."""
-        return np.asarray(self.H @ (self @ x))
+        """A.H @ A @ x of amplitudes (n,). Samples are made when the image reads them, in blocks of rows.
+
+        They are in memory only where max_bytes is so small that the image, or a factorised echo, is made in parts.
+        """
+        values = np.asarray(x)
+        if values.shape != self.shape[1:]:
+            raise ValueError(f"x has shape {values.shape}, wanted one number per pixel ({self.shape[1]},)")
+        measurement, row_bytes = self._measurement, 16 * self._measurement.shape[1]
+        at_once = max(1, min(ROWS, int(self._available / 16 / row_bytes)))
+
+        def pixels(amplitudes: np.ndarray) -> np.ndarray:
+            rows_of = self._forward.rows_of(amplitudes)
+
+            def rows(start: int, stop: int) -> np.ndarray:
+                return measurement.weighted(measurement.weighted(rows_of(start, stop), start), start)
+
+            return self._image(RowsAsRead(rows, self.n_rows, at_once, np.dtype(self._forward.dtype)))
+
+        return self._applied("x", pixels, values)
 
     def norm(self, tolerance: float = 1e-3, seed: int = 0) -> float:
         """The largest singular value, by power iteration from random amplitudes; a lower bound.
@@ -351,7 +368,7 @@ class Echoes(_Named):
         measurement = self._measurement
 
         def samples(amplitudes: np.ndarray) -> np.ndarray:
-            return measurement.weighted(self._forward(amplitudes)).ravel()
+            return measurement.weighted(self._forward.rows_of(amplitudes)(0, self.n_rows)).ravel()
 
         return self._applied("x", samples, x.ravel())
 

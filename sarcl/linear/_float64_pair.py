@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -139,20 +140,24 @@ class TransposedImage:
         units, n_rows = self.device.info.units, self.task.raw.n_rows
         return int(np.clip(4 * units // min(ROWS, n_rows), 1, min(self.n_tiles, 64)))
 
-    def __call__(self, amplitudes: np.ndarray) -> np.ndarray:
-        """Samples (n_rows, n_samples) complex128 of amplitudes (n,) of all pixels."""
+    def rows_of(self, amplitudes: np.ndarray) -> Callable[[int, int], np.ndarray]:
+        """What makes samples (stop - start, n_samples) complex128 of rows start ... stop - 1: of amplitudes (n,) of
+        all pixels."""
+        return partial(self._rows, self.on_device(amplitudes))
+
+    def _rows(self, values: Buffer, first: int, last: int) -> np.ndarray:
         device, raw, splits, interpolator = self.device, self.task.raw, self.splits, self.plan.interpolator
-        values, stride = self.on_device(amplitudes), self.plan.length + 2 * self.pad
-        out = np.empty((raw.n_rows, raw.n_samples), np.complex128)
+        stride, out = self.plan.length + 2 * self.pad, np.empty((last - first, raw.n_samples), np.complex128)
         row_bytes = 16 * stride * splits
         at_once = max(1, min(ROWS, int(self.budget / 2 / row_bytes), int(device.info.max_alloc / row_bytes)))
-        for start in range(0, raw.n_rows, at_once):
-            stop = min(start + at_once, raw.n_rows)
+        for start in range(first, last, at_once):
+            stop = min(start + at_once, last)
             rows = device.zeros(row_bytes * (stop - start))
             self.by_rows("spread_float64.cl", "spread", (start, stop), (), values, rows)
             profiles = np.empty((splits, stop - start, stride), np.complex128)
             device.download(rows, profiles)
-            out[start:stop] = range_profiles.to_samples(device, profiles.sum(axis=0), raw.n_samples, interpolator)
+            of_rows = range_profiles.to_samples(device, profiles.sum(axis=0), raw.n_samples, interpolator)
+            out[start - first : stop - first] = of_rows
         return out
 
     def by_rows(

@@ -23,6 +23,7 @@ from sarcl.opencl.failures import DeviceFailed
 from sarcl.reference.equations import point_echo
 from sarcl.reference.linear import matrix, spread
 from sarcl.simulation import kernel_images
+from sarcl.simulation.points.direct import PointSpreader
 
 GRID = sarcl.ImageGrid.plane(shape=(17, 12), spacing=0.25)
 
@@ -68,6 +69,8 @@ def random_task(seed):
         options |= {"weights": random.random(n_rows) + 0.1, "window": "hamming"}
     if seed % 7 == 0:
         options["waveform"] = sarcl.Waveform.tone(center=9.6e9, duration=4e-9)
+    if seed % 8 == 3:
+        options["antenna"] = sarcl.Antenna.gaussian(width=0.5)
     return domain, like, options
 
 
@@ -261,6 +264,31 @@ def test_memory_limits_change_nothing_but_rounding():
             assert np.linalg.norm(one - other) < 1e-6 * np.linalg.norm(one)
         one, other = (op.gradients(x, y, of="positions")["positions"] for op in (A, B))
         assert np.linalg.norm(one - other) < 1e-9 * np.linalg.norm(one)
+
+
+@pytest.mark.parametrize("options", [{}, {"exact": True}, {"max_bytes": 1e6}])
+def test_normal_makes_each_sample_once_and_in_blocks(options, monkeypatch):
+    """Of 256 rows at most; with little memory the image is made in parts, which read samples again."""
+    like, side = noise_history(n_rows=600, n_samples=16), 224 if "max_bytes" in options else 40
+    grid = sarcl.ImageGrid.plane(shape=(side, side), spacing=0.03)
+    A = sarcl.linear.Echoes(grid, like, weights=np.linspace(0.5, 1.5, 600), **{"method": "direct"} | options)
+    x, made, add = random_vector(grid.size), [], PointSpreader.add
+
+    def watched(self, samples, pulses, *rest):
+        made.append((pulses[0], pulses[-1] + 1))
+        return add(self, samples, pulses, *rest)
+
+    monkeypatch.setattr(PointSpreader, "add", watched)
+    got = A.normal(x)
+    monkeypatch.undo()
+    expected = A.H @ (A @ x)
+    assert np.linalg.norm(got - expected) < 1e-6 * np.linalg.norm(expected)
+    assert made == [(0, 256), (256, 512), (512, 600)] or options
+    assert max([b - a for a, b in made], default=0) <= 256
+    again = len(made) - len(set(made))
+    assert again <= len(set(made)) and (again > 0) == ("max_bytes" in options)
+    with pytest.raises(ValueError, match=r"x has shape \(3,\)"):
+        A.normal(np.ones(3))
 
 
 def test_empty_cells_of_a_grid_send_and_get_nothing():
