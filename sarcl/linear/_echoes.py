@@ -26,7 +26,7 @@ from ..opencl.choose_device import open_device
 from ..opencl.device import DeviceChoice
 from ..opencl.memory_budget import budget
 from ..scattering.antenna_weights import AntennaWeights
-from ._autograd import jax_function, rows_of_batch, torch_batch, torch_function
+from ._autograd import host_array, jax_function, rows_of_batch, torch_batch, torch_function
 from ._float32_pair import Image, PointEchoes
 from ._float64_pair import ROWS, TransposedImage, choice_of
 from ._gradients import KINDS, Gradients, Kind
@@ -52,7 +52,7 @@ class _Named(LinearOperator):
             return super().dot(x)
         if issparse(x):
             raise TypeError(f"x is a {type(x).__name__}, and columns are dense arrays: give x.toarray()")
-        x = np.asarray(x)
+        x = host_array(x)
         if x.ndim not in (1, 2) or x.shape[0] != self.shape[1]:
             raise ValueError(
                 f"x has shape {x.shape}, and the operator {self.shape}: give one number for each {self.domain}, "
@@ -197,7 +197,7 @@ class Echoes(_Named):
 
         They are in memory only where max_bytes is so small that the image, or a factorised echo, is made in parts.
         """
-        values = np.asarray(x)
+        values = host_array(x)
         if values.shape != self.shape[1:]:
             raise ValueError(f"x has shape {values.shape}, wanted one number per pixel ({self.shape[1]},)")
         measurement, row_bytes = self._measurement, 16 * self._measurement.shape[1]
@@ -333,7 +333,7 @@ class Echoes(_Named):
 
     def _vector(self, name: str, values: ArrayLike, axis: int) -> np.ndarray:
         """Finite values, complex128, of as many elements as an axis of the operator has."""
-        array = converted(name, values, np.complex128)
+        array = converted(name, host_array(values), np.complex128)
         if array.shape != (self.shape[axis],):
             raise ValueError(
                 f"{name} has shape {array.shape}, wanted ({self.shape[axis]},), as the operator {self.shape}"
@@ -360,7 +360,7 @@ class Echoes(_Named):
     def _of_batch(operator: LinearOperator, x: ArrayLike, inside: tuple[int, ...], out: tuple[int, ...]) -> np.ndarray:
         if hasattr(x, "detach"):
             return torch_batch(operator, x, inside, out)
-        array = np.asarray(x)
+        array = host_array(x)
         vectors, shape = rows_of_batch(array, inside, out)
         return np.ascontiguousarray((operator @ vectors.T).T).reshape(shape)
 

@@ -459,7 +459,7 @@ def test_a_forked_process_is_refused():
 def test_an_operator_is_right_again_after_its_device_failed(exact, monkeypatch):
     A = sarcl.linear.Echoes(GRID, noise_history(n_rows=9, n_samples=16), exact=exact)
     x, y = random_vector(A.shape[1]), random_vector(A.shape[0], 1)
-    uses = (lambda: A @ x, lambda: A.H @ y, lambda: A.gradients(x, y, of="tx")["tx"])
+    uses = (lambda: A @ x, lambda: A.H @ y, lambda: A.normal(x), lambda: A.gradients(x, y, of="tx")["tx"])
     expected, run = [use() for use in uses], Device.run
 
     def lost(self, kernel, *arguments, **options):
