@@ -1,21 +1,26 @@
 // Direct backprojection in float64, for tolerances below those of float32: ranges lose nothing at any distance.
 //
-//   I(x) = sum_p v_p(x) s~_p(2 delta_p(x)/c) exp(+j 2 pi kappa_p delta_p(x)),   delta = half path - reference range
+//   I(x) = sum_p v_p(x) conj(g_p(x)) s~_p(2 delta_p(x)/c) exp(+j 2 pi kappa_p delta_p(x)),   delta = half path - reference range
 //
 // source    the image equation of sarcl/__init__.py
 // symbols   delta, kappa as in point_path_float64.clh;  s~_p  range profile between its samples
 // macros    VW, WRAP, TAPS, TERMS, BISTATIC, BEAM, ORDER as in the headers
-//           WEIGHT    0 or 1: see pixel_weights.clh
-//           TOWARDS   3: three images, whose rows are weighted by the mean of the unit vectors to T and R along x, y, z
+//           WEIGHT    0, 1 or 2: see pixel_weights.clh;  GAINS, ALIKE as in gains_float64.clh, where it is 2
+//           GRADIENT  1: the gradient of <y, A x> by positions over amplitudes, conjugate: three images of y times j 2 pi kappa,
+//                     weighted by minus the mean of the unit vectors to T and R, and of y times the gradient of the gains
 //           CHUNK     pulses added plainly before they join the compensated total
 // reference: sarcl/reference/backproject.py:backproject
 
+#ifndef GRADIENT
+#define GRADIENT 0
+#endif
 #include "geometry_float64.clh"
 #include "interp_float64.clh"
-#include "point_path_float64.clh"
 #include "pixel_weights.clh"
+#include "point_path_float64.clh"
+#include "gains_float64.clh"
 
-#define CHANNELS (TOWARDS ? 3 : 1)
+#define CHANNELS (GRADIENT ? 3 : 1)
 
 typedef struct {
     ulong pixels;
@@ -29,14 +34,16 @@ typedef struct {
 //   n_used      <= n                  pulses that are real; the rest pads the vectors
 //   positions   (3, pixels)           m; one tile after another
 //   image       (CHANNELS, 4, pixels) totals re, im and their errors re, im
-//   place       (n_used), taper (TAPER), aperture (2, pixels): start and inverse; not read where WEIGHT is 0
+//   place       (n_used), taper (TAPER), aperture (2, pixels): start and inverse; not read where WEIGHT is 0. Where it is 2
+//               taper has the patterns, and aperture the axes (n_used, 18)
 //   skipped     (2, n_tiles)          pulses in whose window no point of the tile lies, and those in whose beam none does
+//   plain       as profiles, which are those of y times j 2 pi kappa: of y itself. Read where there are gains and GRADIENT
 __kernel void backproject(backproject_numbers given, __global const double *restrict profiles,
                           __global const double *restrict table, __global const double *restrict pulse,
                           __global const double *restrict constants, __global const double *restrict tile,
                           __global const double *restrict positions, __global double *restrict image,
                           __global int *restrict skipped, __global const double *restrict place,
-                          __global const double *restrict taper, __global const double *restrict aperture) {
+                          __global const double *restrict taper, __global const double *restrict aperture, __global const double *restrict plain) {
     size_t k = given.first + get_global_id(1), i = k * get_global_size(0) + get_global_id(0), pixels = given.pixels;
     int n = given.n, n_used = given.n_used, n_tiles = given.n_tiles, stride = given.stride, origin = given.origin;
     __global const double *record = constants + get_global_id(1) * (size_t)n * N_CONST;
@@ -72,12 +79,37 @@ __kernel void backproject(backproject_numbers given, __global const double *rest
                 g *= weight;
                 h *= weight;
             }
-            dv along[3] = {at.toward.x, at.toward.y, at.toward.z};
+            dv a = fma(g, cosine, -h * sine), b = fma(g, sine, h * cosine);
+            pattern_value sent, received;
+            if (MATCHED) {
+                gains_of(at, taper, aperture + 18 * (size_t)p, &sent, &received);
+                dv real = a;
+                a = fma(sent.re, real, sent.im * b);
+                b = fma(sent.re, b, -sent.im * real);
+            }
+            if (!GRADIENT) {
+                re[0] += a;
+                im[0] += b;
+                continue;
+            }
+            point e = times((dv)-0.5, sum_of_points(at.to_tx, at.to_rx));
+            dv along[3] = {e.x, e.y, e.z};
 #pragma unroll
             for (int c = 0; c < CHANNELS; c++) {
-                dv a = TOWARDS ? g * along[c] : g, b = TOWARDS ? h * along[c] : h;
-                re[c] = fma(a, cosine, fma(-b, sine, re[c]));
-                im[c] = fma(a, sine, fma(b, cosine, im[c]));
+                re[c] = fma(a, along[c], re[c]);
+                im[c] = fma(b, along[c], im[c]);
+            }
+            if (MATCHED) {
+                weighted_sum(plain + 2 * ((size_t)p * stride + origin), j, w, &g, &h);
+                a = fma(g, cosine, -h * sine) * at.inside;
+                b = fma(g, sine, h * cosine) * at.inside;
+                point x_re = moved_both(at, sent.slope_re, received.slope_re), x_im = moved_both(at, sent.slope_im, received.slope_im);
+                dv real[3] = {x_re.x, x_re.y, x_re.z}, imaginary[3] = {x_im.x, x_im.y, x_im.z};
+#pragma unroll
+                for (int c = 0; c < CHANNELS; c++) {
+                    re[c] -= fma(real[c], a, imaginary[c] * b);
+                    im[c] -= fma(real[c], b, -imaginary[c] * a);
+                }
             }
         }
         for (int c = 0; c < CHANNELS; c++) {

@@ -1,19 +1,17 @@
 // Echoes of points in float64: the transpose of backproject_float64.cl, with the same records, weights and phases.
 //
-//   s~_p[j + k] = sum_x v_p(x) a(x) w_k(t_p(x)) exp(-j 2 pi kappa_p delta_p(x)),   times e.(unit vector from x to T or R)
+//   s~_p[j + k] = sum_x v_p(x) g_p(x) a(x) w_k(t_p(x)) exp(-j 2 pi kappa_p delta_p(x))
 //
 // source    the echo equation of sarcl/__init__.py; type-1 nonuniform FFT in range
-// symbols   delta, kappa, v_p, t as in point_path_float64.clh;  w_k, j as in interp_float64.clh
-// macros    VW, WRAP, TAPS, TERMS, BISTATIC, BEAM, ORDER, WEIGHT as in the headers
-//           TOWARDS   1, 2: three rows per pulse, weighted by the unit vectors to T or R along x, y, z; 0: one row
+// symbols   delta, kappa, v_p, t as in point_path_float64.clh;  w_k, j as in interp_float64.clh;  g of gains_float64.clh
+// macros    VW, WRAP, TAPS, TERMS, BISTATIC, BEAM, ORDER, WEIGHT, GAINS, ALIKE as in the headers
 // reference: sarcl/reference/linear.py:spread
 
 #include "geometry_float64.clh"
 #include "interp_float64.clh"
-#include "point_path_float64.clh"
 #include "pixel_weights.clh"
-
-#define CHANNELS (TOWARDS ? 3 : 1)
+#include "point_path_float64.clh"
+#include "gains_float64.clh"
 
 typedef struct {
     ulong pixels;
@@ -47,7 +45,7 @@ static inline void add_taps(__global double *row, lv j, const dv *w, dv re, dv i
 //   pulse, constants, tile, positions, table, place, taper, aperture   as in backproject_float64.cl
 //   n_run, vectors   tiles of this call, and vectors of points in a tile
 //   amplitudes  (2, pixels)    re, im
-//   rows        (splits, n_used, CHANNELS, stride, 2)   added to; delay 0 stands at sample `origin`
+//   rows        (splits, n_used, stride, 2)   added to; delay 0 stands at sample `origin`
 __kernel void spread(spread_numbers given, __global const double *restrict table, __global const double *restrict pulse,
                      __global const double *restrict constants, __global const double *restrict tile,
                      __global const double *restrict positions, __global const double *restrict amplitudes,
@@ -55,7 +53,7 @@ __kernel void spread(spread_numbers given, __global const double *restrict table
                      __global const double *restrict aperture) {
     size_t p = get_global_id(0), pixels = given.pixels, n_tiles = given.n_tiles, n = given.n;
     int stride = given.stride, origin = given.origin, vectors = given.vectors;
-    rows += 2 * ((get_global_id(1) * given.n_used + p) * CHANNELS * stride + origin);
+    rows += 2 * ((get_global_id(1) * given.n_used + p) * stride + origin);
     for (int r = get_global_id(1); r < given.n_run; r += get_global_size(1)) {
         __global const double *record = constants + (r * n + p) * N_CONST;
         int state = convert_int(record[C_STATE]);
@@ -76,13 +74,14 @@ __kernel void spread(spread_numbers given, __global const double *restrict table
                 re *= weight;
                 im *= weight;
             }
-            if (TOWARDS) {
-                add_taps(rows, j, w, re * at.toward.x, im * at.toward.x);
-                add_taps(rows + 2 * (size_t)stride, j, w, re * at.toward.y, im * at.toward.y);
-                add_taps(rows + 4 * (size_t)stride, j, w, re * at.toward.z, im * at.toward.z);
-            } else {
-                add_taps(rows, j, w, re, im);
+            if (MATCHED) {
+                pattern_value gain, unused;
+                gains_of(at, taper, aperture + 18 * p, &gain, &unused);
+                dv real = re;
+                re = fma(gain.re, real, -gain.im * im);
+                im = fma(gain.re, im, gain.im * real);
             }
+            add_taps(rows, j, w, re, im);
         }
     }
 }

@@ -128,6 +128,26 @@ def shares(task: FocusingTask, points: np.ndarray) -> np.ndarray:
     return np.stack(gains, axis=1)
 
 
+class GainsFloat64:
+    """Buffers of an antenna for the kernels in float64, in the places of those of `TaperOnDevice`."""
+
+    pixel_bytes = 0
+
+    def __init__(self, device: Device, task: FocusingTask) -> None:
+        assert task.antenna is not None
+        self.device, self.beam, macros = device, task.antenna, task.antenna.macros(1)
+        self.patterns, _ = self.beam.upload(device, np.float64)
+        self.macros = {"WEIGHT": 2, "GAINS": macros["GAINS"], "ALIKE": macros["ALIKE"]}
+
+    def apertures(self, positions: np.ndarray) -> None:
+        """None: gains have no numbers per pixel."""
+
+    def arguments(self, apertures: Buffer | None, start: int, stop: int) -> tuple[Buffer | None, ...]:
+        """The kernel's arguments of rows start ... stop - 1: patterns twice, and axes."""
+        axes = self.beam.packed_axes(np.arange(start, stop), np.float64)
+        return self.patterns, self.patterns, self.device.upload(axes)
+
+
 class AntennaOnDevice:
     """Buffers of an antenna for the kernels; gain  True: they add up |g|^2 times the rows' weights, not the echoes."""
 

@@ -3,13 +3,12 @@
 
 For this folder alone:
 
-    _antenna_gradients  gradients where an antenna has gains: pointing, reference ranges, phases
-    _autograd           the operator as a function that PyTorch and JAX differentiate
-    _echoes             Echoes: the operator
-    _float32_pair       both directions in float32: the plans of echo and backproject, made once
-    _float64_pair       both directions in float64, one the transpose of the other to rounding
-    _gradients          gradients of Re <y, A x> with respect to amplitudes and to what moves
-    _measurement        what both directions share: rows, weights, pixels
+    _autograd      the operator as a function that PyTorch and JAX differentiate
+    _echoes        Echoes: the operator
+    _float32_pair  both directions in float32: the plans of echo and backproject, made once
+    _float64_pair  both directions in float64, one the transpose of the other to rounding
+    _gradients     gradients of Re <y, A x> with respect to amplitudes and to what moves
+    _measurement   what both directions share: rows, weights, pixels
 """
 
 from ._echoes import Echoes as Echoes

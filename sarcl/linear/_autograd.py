@@ -126,6 +126,16 @@ def torch_batch(operator: LinearOperator, x, inside: tuple[int, ...], out: tuple
     return Apply.apply(vectors).reshape(shape)
 
 
+def host_array(x) -> np.ndarray:
+    """A NumPy array in the memory of x where x lends it by DLPack, as tensors of the host do; else np.asarray(x)."""
+    if not isinstance(x, np.ndarray) and hasattr(x, "__dlpack__"):
+        try:
+            return np.from_dlpack(x)
+        except (BufferError, RuntimeError, TypeError, ValueError):  # of another device, or with derivatives
+            pass
+    return np.asarray(x)
+
+
 def _array(tensor) -> np.ndarray:
     """The numbers of a tensor, in the tensor's own memory where that is the host's."""
     return np.asarray(tensor.detach().cpu().resolve_conj().numpy())
@@ -153,11 +163,11 @@ def jax_function(operator: Echoes) -> Callable[..., object]:
         return jax.ShapeDtypeStruct((operator.shape[0],), operator.result_type(np.dtype(x.dtype)))
 
     def on_host(x, values):
-        return Applied(operator, np.asarray(x), {k: np.asarray(v) for k, v in values.items()}).samples()
+        return Applied(operator, host_array(x), {k: host_array(v) for k, v in values.items()}).samples()
 
     def gradients_on_host(x, values, y):
-        applied = Applied(operator, np.asarray(x), {k: np.asarray(v) for k, v in values.items()})
-        gradients = applied.gradients(np.asarray(y).conj())
+        applied = Applied(operator, host_array(x), {k: host_array(v) for k, v in values.items()})
+        gradients = applied.gradients(host_array(y).conj())
         of_x = gradients.pop("x").conj()
         of_x = (of_x if np.iscomplexobj(x) else of_x.real).astype(x.dtype)
         return of_x, {name: np.asarray(gradients[name], values[name].dtype) for name in values}

@@ -25,13 +25,12 @@ from ..numerics.windows import Window
 from ..opencl.choose_device import open_device
 from ..opencl.device import DeviceChoice
 from ..opencl.memory_budget import budget
-from ._antenna_gradients import KINDS as OF_ANTENNA
-from ._antenna_gradients import gradients as antenna_gradients
-from ._autograd import jax_function, rows_of_batch, torch_batch, torch_function
+from ..scattering.antenna_weights import AntennaWeights
+from ._autograd import host_array, jax_function, rows_of_batch, torch_batch, torch_function
 from ._float32_pair import Image, PointEchoes
-from ._float64_pair import TransposedImage, choice_of
+from ._float64_pair import ROWS, TransposedImage, choice_of
 from ._gradients import KINDS, Gradients, Kind
-from ._measurement import Arguments, Domain, measurement_of
+from ._measurement import Arguments, Domain, RowsAsRead, measurement_of
 
 MOST_ROUNDS = 200  # of the power iteration
 # Errors of both directions are independent: <y, A x> - <A.H y, x> is smaller than they are by the root of the numbers
@@ -53,7 +52,7 @@ class _Named(LinearOperator):
             return super().dot(x)
         if issparse(x):
             raise TypeError(f"x is a {type(x).__name__}, and columns are dense arrays: give x.toarray()")
-        x = np.asarray(x)
+        x = host_array(x)
         if x.ndim not in (1, 2) or x.shape[0] != self.shape[1]:
             raise ValueError(
                 f"x has shape {x.shape}, and the operator {self.shape}: give one number for each {self.domain}, "
@@ -142,29 +141,27 @@ class Echoes(_Named):
         arguments = Arguments(
             tolerance, exact, method, waveform, weights, antenna, beam, window, wrap, device, max_bytes
         )
-        self._prepare(domain, like, arguments, None)
+        self._prepare(domain, like, arguments)
 
-    def _prepare(self, domain: Domain, like: PhaseHistory, arguments: Arguments, known: TransposedImage | None) -> None:
-        """Plan; in float64 as a known pair, where that plan holds."""
+    def _prepare(
+        self,
+        domain: Domain,
+        like: PhaseHistory,
+        arguments: Arguments,
+        known: TransposedImage | None = None,
+        aimed: AntennaWeights | None = None,
+    ) -> None:
+        """Plan; in float64 as a known pair, where that plan holds; aimed  gains whose axes the antennas keep."""
         self._domain, self._like, self._arguments = domain, like, arguments
         self.tolerance, self.exact = float(arguments.tolerance), bool(arguments.exact)
         self._device, self._lock = open_device(arguments.device), threading.RLock()
-        self._measurement = measurement = measurement_of(domain, like, arguments)
+        self._measurement = measurement = measurement_of(domain, like, arguments, aimed)
         self._available = budget(self._device, arguments.max_bytes)
         self._gradients: Gradients | None = None
         self._forward: PointEchoes | TransposedImage
-        if self.exact or self.tolerance < LEAST_TOLERANCE or measurement.is_cut:
+        if self.exact or self.tolerance < LEAST_TOLERANCE or measurement.is_cut or not self._plan_in_float32():
             self._forward = self._float64_pair(arguments.method, known)
             self._image = Image(self._options(self.tolerance), measurement, self._forward.choice)
-        else:
-            few = math.sqrt(min(measurement.seen_pixels, math.prod(measurement.shape)) / MANY)
-            inner = max(self.tolerance * min(max(few, LEAST_SHARE), 1.0), LEAST_TOLERANCE)
-            try:
-                self._plan_in_float32(inner)
-            except ToleranceUnreachable:
-                if inner == self.tolerance:
-                    raise
-                self._plan_in_float32(self.tolerance)
         self._pair = self._forward if isinstance(self._forward, TransposedImage) else None
         self.predicted_error = max(self._forward.predicted_error, self._image.choice.predicted_error)
         dtype = np.complex128 if self.tolerance < LEAST_TOLERANCE else np.complex64
@@ -175,16 +172,46 @@ class Echoes(_Named):
         method, most = self._arguments.method, self._arguments.max_bytes
         return BackprojectOptions(tolerance=tolerance, method=method, device=self._device, max_bytes=most)
 
-    def _plan_in_float32(self, tolerance: float) -> None:
-        """Plan each direction by itself."""
-        measurement, options = self._measurement, self._options(tolerance)
-        chosen = options.choose(measurement.task, [self._device])
-        self._forward = PointEchoes(self._device, measurement, tolerance, self._arguments.method, self._available)
-        self._image = Image(options, measurement, chosen)
+    def _plan_in_float32(self) -> bool:
+        """Plan each direction by itself; False where gains of an antenna need float64, which the device has."""
+        measurement = self._measurement
+        few = math.sqrt(min(measurement.seen_pixels, math.prod(measurement.shape)) / MANY)
+        least = max(self.tolerance * min(max(few, LEAST_SHARE), 1.0), LEAST_TOLERANCE)
+        for tolerance in sorted({least, self.tolerance}):
+            options, method = self._options(tolerance), self._arguments.method
+            try:
+                chosen = options.choose(measurement.task, [self._device])
+                self._forward = PointEchoes(self._device, measurement, tolerance, method, self._available)
+            except ToleranceUnreachable:
+                if tolerance < self.tolerance:
+                    continue
+                if measurement.task.antenna is None or not self._device.info.fp64 or method == "factorized":
+                    raise
+                return False
+            self._image = Image(options, measurement, chosen)
+            break
+        return True
 
     def normal(self, x: ArrayLike) -> np.ndarray:
-        """A.H @ A @ x of amplitudes (n,). The samples are in memory meanwhile."""
-        return np.asarray(self.H @ (self @ x))
+        """A.H @ A @ x of amplitudes (n,). Samples are made when the image reads them, in blocks of rows.
+
+        They are in memory only where max_bytes is so small that the image, or a factorised echo, is made in parts.
+        """
+        values = host_array(x)
+        if values.shape != self.shape[1:]:
+            raise ValueError(f"x has shape {values.shape}, wanted one number per pixel ({self.shape[1]},)")
+        measurement, row_bytes = self._measurement, 16 * self._measurement.shape[1]
+        at_once = max(1, min(ROWS, int(self._available / 16 / row_bytes)))
+
+        def pixels(amplitudes: np.ndarray) -> np.ndarray:
+            rows_of = self._forward.rows_of(amplitudes)
+
+            def rows(start: int, stop: int) -> np.ndarray:
+                return measurement.weighted(measurement.weighted(rows_of(start, stop), start), start)
+
+            return self._image(RowsAsRead(rows, self.n_rows, at_once, np.dtype(self._forward.dtype)))
+
+        return self._applied("x", pixels, values)
 
     def norm(self, tolerance: float = 1e-3, seed: int = 0) -> float:
         """The largest singular value, by power iteration from random amplitudes; a lower bound.
@@ -216,28 +243,20 @@ class Echoes(_Named):
               "reference_range", per m, and "phase", of samples times exp(j phase), per rad (n_rows,). "pointing", of
               rotation vectors of both antennas' axes in the scene, per rad (n_rows, 3): with antenna= alone
 
-        With antenna= there are "amplitudes", "reference_range", "phase" and "pointing", in float32: gains would move
-        with positions.
-
-        Without, all but "amplitudes" are float64 and computed in float64, within about the tolerance of their norms at
-        random phases. What range windows, beams and windows over the aperture cut does not move. ValueError: unknown
-        kinds, kinds that an antenna excludes or needs, a device without float64.
+        All but "amplitudes" are float64 and computed in float64, within about the tolerance of their norms at random
+        phases. Gains of antennas change with positions, and their axes keep their directions. What range windows,
+        beams and windows over the aperture cut does not move. ValueError: unknown kinds, "pointing" without antenna=,
+        "rx" of one antenna, a device without float64.
         """
         is_one_antenna = self._like.rx is self._like.tx
         has_gains = self._measurement.task.antenna is not None
+        absent = {"rx": is_one_antenna, "pointing": not has_gains}
         if of is None:
-            absent = {"pointing", "rx"} if is_one_antenna else {"pointing"}
-            of = [kind for kind in KINDS if (kind in OF_ANTENNA if has_gains else kind not in absent)]
+            of = [kind for kind in KINDS if not absent.get(kind)]
         kinds: list[Kind] = [of] if isinstance(of, str) or not isinstance(of, Iterable) else [*of]
         for kind in kinds:
             choice("of", kind, KINDS)
-        excluded = [kind for kind in kinds if (kind not in OF_ANTENNA if has_gains else kind == "pointing")]
-        if excluded and has_gains:
-            raise ValueError(
-                f'of has "{excluded[0]}", but gains of antenna= move with it: take of={OF_ANTENNA}, or an operator '
-                "without antenna="
-            )
-        if excluded:
+        if "pointing" in kinds and not has_gains:
             raise ValueError('of has "pointing", which needs gains that depend on directions: give antenna=')
         x, y = (self._vector(name, value, n) for name, value, n in (("x", x, 1), ("y", y, 0)))
         out = {"amplitudes": self.H @ y} if "amplitudes" in kinds else {}
@@ -248,8 +267,6 @@ class Echoes(_Named):
                 )
             samples = y.reshape(self._measurement.shape)
             with self._lock:
-                if has_gains and isinstance(self._forward, PointEchoes):
-                    return out | antenna_gradients(self._forward, self._measurement, x, samples, kinds)
                 if self._gradients is None:
                     pair = self._pair or self._float64_pair()
                     self._gradients = Gradients(pair, self._measurement, self._available)
@@ -266,8 +283,8 @@ class Echoes(_Named):
     ) -> Echoes:
         """The operator at other positions of points, m (n, 3), or antennas, m (n_rows, 3), or reference ranges, m.
 
-        Other arguments are as they were. In float64 the plan is kept as long as it meets the tolerance, else, and in
-        float32, it is planned for the new geometry.
+        Other arguments are as they were, and the axes of antennas too. In float64 the plan is kept as long as it meets
+        the tolerance, else, and in float32, it is planned for the new geometry.
         """
         like = self._like
         if tx is not None:
@@ -277,7 +294,8 @@ class Echoes(_Named):
         if reference_range is not None:
             like = replace(like, reference_range=converted("reference_range", reference_range, np.float64))
         moved = Echoes.__new__(Echoes)
-        moved._prepare(self._domain if positions is None else positions, like, self._arguments, self._pair)
+        domain = self._domain if positions is None else positions
+        moved._prepare(domain, like, self._arguments, self._pair, self._measurement.task.antenna)
         return moved
 
     def torch(self) -> Callable[..., object]:
@@ -304,10 +322,9 @@ class Echoes(_Named):
 
     def _float64_pair(self, method: str = "auto", known: TransposedImage | None = None) -> TransposedImage:
         """A pair in float64 with the tolerance; its plan is that of a known pair, where that holds."""
-        if self._measurement.task.antenna is not None:
+        if self._measurement.task.antenna is not None and self._measurement.task.taper is not None:
             raise ValueError(
-                "antenna= needs gains, which are computed in float32: leave out exact=True, take a "
-                "tolerance of 1e-6 or more, and no beam= or window over the aperture with other weights in each pixel"
+                "antenna= weighs the rows in each pixel, and so does window over the aperture with beam=: leave one out"
             )
         if method == "factorized":
             raise ValueError("method='factorized' is not possible in float64, which exact=True asks for: take 'auto'")
@@ -316,7 +333,7 @@ class Echoes(_Named):
 
     def _vector(self, name: str, values: ArrayLike, axis: int) -> np.ndarray:
         """Finite values, complex128, of as many elements as an axis of the operator has."""
-        array = converted(name, values, np.complex128)
+        array = converted(name, host_array(values), np.complex128)
         if array.shape != (self.shape[axis],):
             raise ValueError(
                 f"{name} has shape {array.shape}, wanted ({self.shape[axis]},), as the operator {self.shape}"
@@ -343,7 +360,7 @@ class Echoes(_Named):
     def _of_batch(operator: LinearOperator, x: ArrayLike, inside: tuple[int, ...], out: tuple[int, ...]) -> np.ndarray:
         if hasattr(x, "detach"):
             return torch_batch(operator, x, inside, out)
-        array = np.asarray(x)
+        array = host_array(x)
         vectors, shape = rows_of_batch(array, inside, out)
         return np.ascontiguousarray((operator @ vectors.T).T).reshape(shape)
 
@@ -351,7 +368,7 @@ class Echoes(_Named):
         measurement = self._measurement
 
         def samples(amplitudes: np.ndarray) -> np.ndarray:
-            return measurement.weighted(self._forward(amplitudes)).ravel()
+            return measurement.weighted(self._forward.rows_of(amplitudes)(0, self.n_rows)).ravel()
 
         return self._applied("x", samples, x.ravel())
 

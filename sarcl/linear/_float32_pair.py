@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -22,7 +22,7 @@ from ..scattering.antenna_weights import AntennaWeights
 from ..scattering.scatterers import Points
 from ..simulation.points.point_plan import PointPlan, PreparedPoints
 from ..simulation.spreading import ChannelView, HostTiling
-from ._measurement import Measurement
+from ._measurement import Measurement, RowsAsRead
 
 LARGEST_GAIN_SHARE = 0.5  # of a tolerance, for the rounding of gains in float32; the rest is for a plan
 
@@ -34,7 +34,7 @@ class Image:
         self.choice, self._samples, task = choice, measurement.samples, measurement.task
         self._plan = BackprojectPlan(options, task.raw, task.grid, task, choice, None, {})
 
-    def __call__(self, samples: np.ndarray) -> np.ndarray:
+    def __call__(self, samples: np.ndarray | RowsAsRead) -> np.ndarray:
         """Pixels (n,), complex64 or complex128, of samples (n_rows, n_samples)."""
         self._samples.array = samples
         return self._plan.pixels().ravel()
@@ -44,7 +44,6 @@ class PointEchoes:
     """The echoes of the pixels as points: direct or factorised, as `echo` adds them.
 
     predicted_error  relative, for amplitudes with random phases and for equal ones
-    weights          gains of the antenna, or 1
     """
 
     dtype = np.complex64
@@ -71,30 +70,34 @@ class PointEchoes:
         self.plan: PointPlan = prepared.plan(weights, self._view.band, self._inner, 1)
         self.predicted_error = self.plan.predicted_error + gains
 
-    @property
-    def weights(self) -> AntennaWeights:
-        return self._view.weights
-
-    def __call__(self, amplitudes: np.ndarray, weights: AntennaWeights | None = None) -> np.ndarray:
-        """Samples (n_rows, n_samples) complex64 of amplitudes (n,) of all pixels; weights  other gains than its own."""
-        measurement, nodes = self._measurement, np.array([self.weights.frequency])
-        view = self._view if weights is None else replace(self._view, weights=weights)
+    def rows_of(self, amplitudes: np.ndarray) -> Callable[[int, int], np.ndarray]:
+        """What makes samples (stop - start, n_samples) complex64 of rows start ... stop - 1 from amplitudes (n,) of all
+        pixels."""
+        measurement, view = self._measurement, self._view
+        nodes = np.array([view.weights.frequency])
         seen = amplitudes if measurement.seen is None else amplitudes[measurement.seen]
         points = Points(self._points.positions, seen)
-        samples = np.zeros(measurement.shape, np.complex64)
-        every_row, clock = range(len(samples)), Clock()
+        direct = None
         leveled = self.plan.factorized_spreader(self.device, points, view, nodes, (0,), self._budget)
-        if leveled is not None:
-            leveled.add(samples[:, None], every_row, clock, _nothing)
         if self.plan.direct is not None:
             numbers = slice(None) if self.plan.numbers is None else self.plan.numbers
             tiling: Any = self.plan.direct[0].tiling
             assert isinstance(tiling, HostTiling)
             tiling.refill(partial(_planes, seen[numbers]))
             direct = self.plan.direct_spreader(view, nodes, self._inner, self._budget)
-            assert direct is not None
-            direct.add(samples, every_row, clock, _nothing)
-        return samples
+
+        def rows(start: int, stop: int) -> np.ndarray:
+            samples = np.zeros((stop - start, measurement.shape[1]), np.complex64)
+            if leveled is not None:
+                leveled.add(samples[:, None], range(start, stop), Clock(), _nothing)
+            if direct is not None:
+                direct.add(samples, range(start, stop), Clock(), _nothing)
+            return samples
+
+        if leveled is None or leveled.keeps_profiles:
+            return rows
+        samples = rows(0, measurement.shape[0])  # parts would repeat the work on cells
+        return lambda start, stop: samples[start:stop]
 
 
 def _planes(amplitudes: np.ndarray, order: np.ndarray) -> np.ndarray:

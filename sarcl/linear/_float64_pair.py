@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from ..base.errors import ToleranceUnreachable
 from ..base.morton import morton_order
+from ..imaging.antenna_beam import rounding
 from ..imaging.choose_method import MethodChoice, in_float64
-from ..imaging.float64.direct import N_CONST, by_range, packed, remedy
-from ..imaging.float64.plan import Float64Plan
-from ..imaging.pixel_taper import WEIGHT_BUFFERS, TaperOnDevice
+from ..imaging.float64.direct import N_CONST, by_range, packed, remedy, weights_on
+from ..imaging.float64.plan import SIDES, Float64Plan
+from ..imaging.pixel_taper import WEIGHT_BUFFERS
 from ..imaging.tiling.of_grid import tiling_of
 from ..model.waveform import Waveform
 from ..numerics import range_profiles
@@ -22,6 +24,7 @@ from ..opencl.launch_numbers import launch_numbers
 from ..simulation.kernel_images import PatchSamples, sample_patches
 from ._measurement import Measurement
 
+FLOAT64 = 2.0**-27  # rounding of gains in float64 over that in float32, with the error of sines, 4e-15
 LEAST_SHARE = 2.0**-20  # of a tolerance: no plan is looked for below it where images of the kernel add up
 ROWS = 256  # rows whose profiles are on the device at a time
 
@@ -30,21 +33,24 @@ def choice_of(measurement: Measurement, tolerance: float, known: TransposedImage
     """The cheapest plan with which both directions meet the tolerance. ToleranceUnreachable where there is none.
 
     known  pair for a similar geometry, whose plan is taken where it meets the tolerance
-    The error of an image is that of the kernel; of echoes the kernel's images add up where pixels lie evenly.
+    The error of an image is that of the kernel; of echoes the kernel's images add up where pixels lie evenly. Gains of
+    an antenna have the rounding of float64, for which what is left of a tolerance is taken.
     """
+    task = measurement.task
+    gains = 0.0 if task.antenna is None else FLOAT64 * rounding(task, tiling_of(task.grid, SIDES[0]).radius)
     moved = None if known is None else _moved(measurement, known)
     if moved is not None and moved.predicted_error <= tolerance:
         return moved
-    patches, share, task = _patches(measurement), 1.0, measurement.task
+    patches, share = _patches(measurement), 1.0
     bandwidth = float(task.raw.bandwidth.max())
     while True:
-        choice = in_float64(task, share * tolerance)
+        choice = in_float64(task, share * (tolerance - gains))
         if not isinstance(choice, MethodChoice):
             raise choice.restated(tolerance, None) if share < 1 else choice
         plan = choice.plan
         assert isinstance(plan, Float64Plan)
         images = patches.error(plan.interpolator, plan.length, task.raw.n_samples, bandwidth)
-        error = choice.predicted_error + max(images - plan.interpolator.error, 0)
+        error = choice.predicted_error + max(images - plan.interpolator.error, 0) + gains
         if error <= tolerance:
             return replace(choice, predicted_error=error)
         share /= 2
@@ -87,7 +93,7 @@ class TransposedImage:
 
     def __init__(self, device: Device, measurement: Measurement, choice: MethodChoice, budget: float) -> None:
         if not device.info.fp64:
-            raise ValueError(f"exact=True needs float64, which {device.info.name!r} lacks: {remedy()}")
+            raise ValueError(f"exact=True needs float64, as gradients do, which {device.info.name!r} lacks: {remedy()}")
         plan, tiling = choice.plan, choice.tiling
         assert isinstance(plan, Float64Plan)
         self.device, self.task, self.plan, self.tiling, self.budget = device, measurement.task, plan, tiling, budget
@@ -95,7 +101,7 @@ class TransposedImage:
         task = self.task
         geometry = {"BISTATIC": int(not task.antennas.is_monostatic), "BEAM": int(task.antennas.beam is not None)}
         self._constants = device.kernel("tile_constants_float64.cl", "tile_constants", **geometry)
-        self.taper = TaperOnDevice(device, task, np.float64)
+        self.taper = weights_on(device, task)
         self.macros = {**geometry, **plan.macros(task.wrap), **self.taper.macros}
         del self.macros["CHUNK"]
         self.pad = range_profiles.padding(plan.interpolator)
@@ -122,45 +128,53 @@ class TransposedImage:
         self.positions = upload(positions.reshape(-1, 3).T)
         self.apertures = self.taper.apertures(positions)
 
-    def __call__(self, amplitudes: np.ndarray, towards: int = 0) -> np.ndarray:
-        """Samples (n_rows, n_samples) complex128 of amplitudes (n,) of all pixels.
-
-        towards  1, 2: of amplitudes times the unit vectors to the transmitter or receiver, (3, n_rows, n_samples)
-        """
-        device, raw, n_channels = self.device, self.task.raw, 3 if towards else 1
+    def on_device(self, amplitudes: np.ndarray) -> Buffer:
+        """Amplitudes (n,) of all pixels in the order of the tiles, re and im (2, pixels)."""
         lanes = np.zeros((2, self.n_tiles * self.per_tile))
         lanes[:, self.lane_of] = amplitudes[self.pixels].real, amplitudes[self.pixels].imag
-        values, interpolator = device.upload(lanes), self.plan.interpolator
-        out = np.empty((n_channels, raw.n_rows, raw.n_samples), np.complex128)
-        stride = self.plan.length + 2 * self.pad
-        splits = int(np.clip(4 * device.info.units // min(ROWS, raw.n_rows), 1, min(self.n_tiles, 64)))
-        row_bytes = 16 * stride * n_channels * splits
-        at_once = max(1, min(ROWS, int(self.budget / 2 / row_bytes), int(device.info.max_alloc / row_bytes)))
-        for start in range(0, raw.n_rows, at_once):
-            stop = min(start + at_once, raw.n_rows)
-            rows = device.zeros(row_bytes * (stop - start))
-            self._spread(values, rows, (start, stop), splits, towards)
-            profiles = np.empty((splits, stop - start, n_channels, stride), np.complex128)
-            device.download(rows, profiles)
-            total = profiles.sum(axis=0).reshape(-1, stride)
-            spectra = range_profiles.to_samples(device, total, raw.n_samples, interpolator)
-            out[:, start:stop] = spectra.reshape(stop - start, n_channels, -1).swapaxes(0, 1)
-        return out if towards else out[0]
+        return self.device.upload(lanes)
 
-    def _spread(self, values: Buffer, rows: Buffer, block: tuple[int, int], splits: int, towards: int) -> None:
-        """Add all tiles to the profiles of a block of rows."""
+    @property
+    def splits(self) -> int:
+        """Work-items for each row."""
+        units, n_rows = self.device.info.units, self.task.raw.n_rows
+        return int(np.clip(4 * units // min(ROWS, n_rows), 1, min(self.n_tiles, 64)))
+
+    def rows_of(self, amplitudes: np.ndarray) -> Callable[[int, int], np.ndarray]:
+        """What makes samples (stop - start, n_samples) complex128 of rows start ... stop - 1: of amplitudes (n,) of
+        all pixels."""
+        return partial(self._rows, self.on_device(amplitudes))
+
+    def _rows(self, values: Buffer, first: int, last: int) -> np.ndarray:
+        device, raw, splits, interpolator = self.device, self.task.raw, self.splits, self.plan.interpolator
+        stride, out = self.plan.length + 2 * self.pad, np.empty((last - first, raw.n_samples), np.complex128)
+        row_bytes = 16 * stride * splits
+        at_once = max(1, min(ROWS, int(self.budget / 2 / row_bytes), int(device.info.max_alloc / row_bytes)))
+        for start in range(first, last, at_once):
+            stop = min(start + at_once, last)
+            rows = device.zeros(row_bytes * (stop - start))
+            self.by_rows("spread_float64.cl", "spread", (start, stop), (), values, rows)
+            profiles = np.empty((splits, stop - start, stride), np.complex128)
+            device.download(rows, profiles)
+            of_rows = range_profiles.to_samples(device, profiles.sum(axis=0), raw.n_samples, interpolator)
+            out[start - first : stop - first] = of_rows
+        return out
+
+    def by_rows(
+        self, file: str, name: str, block: tuple[int, int], profiles: tuple[Buffer, ...], values: Buffer, out: Buffer
+    ) -> None:
+        """Run a kernel that adds all tiles to what each row of a block has; profiles  its first buffers."""
         device, stride = self.device, self.plan.length + 2 * self.pad
-        kernel = device.kernel("spread_float64.cl", "spread", **self.macros, TOWARDS=towards)
+        kernel = device.kernel(file, name, **self.macros)
         weights = self.taper.arguments(self.apertures, *block) or WEIGHT_BUFFERS * (self.table,)
         for pulse, n, first, constants, n_run in self.records(block):
             numbers = {"n": n, "n_used": block[1] - block[0], "n_tiles": self.n_tiles, "first": first, "n_run": n_run}
             numbers |= {"stride": stride, "origin": stride // 2, "vectors": self.per_tile // self.lanes}
-            launch = launch_numbers("spread_float64.cl", "spread", pixels=self.n_tiles * self.per_tile, **numbers)
+            launch = launch_numbers(file, name, pixels=self.n_tiles * self.per_tile, **numbers)
             group = (1, 1) if device.is_cpu else None
-            device.run(
-                kernel, (block[1] - block[0], splits), group, launch, self.table, pulse, constants, self.tile,
-                self.positions, values, rows, *weights, steps=n_run * self.per_tile / splits,
-            )  # fmt: skip
+            buffers = *profiles, self.table, pulse, constants, self.tile, self.positions, values, out, *weights
+            steps = n_run * self.per_tile / self.splits
+            device.run(kernel, (block[1] - block[0], self.splits), group, launch, *buffers, steps=steps)
         device.finish()
 
     def records(self, block: tuple[int, int]) -> Iterator[tuple[Buffer, int, int, Buffer, int]]:

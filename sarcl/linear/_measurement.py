@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal, TypeAlias
@@ -20,6 +21,7 @@ from ..model.phase_history import PhaseHistory
 from ..model.waveform import Waveform
 from ..numerics.windows import Window
 from ..opencl.device import DeviceChoice
+from ..scattering.antenna_weights import AntennaWeights
 
 Domain: TypeAlias = ImageGrid | ArrayLike
 SKIPS: tuple[Skip, ...] = (
@@ -29,11 +31,45 @@ SKIPS: tuple[Skip, ...] = (
 )  # all reasons to leave pairs out but weights of 0: rows keep their places
 
 
+class RowsAsRead:
+    """Samples of which a block of `at_once` rows is made when it is read, by make(start, stop), and alone is kept.
+
+    Blocks that are made for the second time, since the image is made in parts, are kept from then on.
+    """
+
+    def __init__(
+        self, make: Callable[[int, int], np.ndarray], n_rows: int, at_once: int, dtype: np.dtype[np.complexfloating]
+    ) -> None:
+        self.dtype, self._make, self._n_rows, self._at_once = dtype, make, n_rows, at_once
+        self._latest, self._made = (-1, np.empty(0)), set[int]()
+        self._kept: dict[int, np.ndarray] = {}
+
+    def __getitem__(self, rows: slice) -> np.ndarray:
+        start, stop, _ = rows.indices(self._n_rows)
+        parts = []
+        while start < stop:
+            first = start // self._at_once * self._at_once
+            block = self._kept.get(first)
+            parts.append((self._of(first) if block is None else block)[start - first : stop - first])
+            start = first + self._at_once
+        return np.concatenate(parts) if len(parts) > 1 else parts[0]
+
+    def _of(self, first: int) -> np.ndarray:
+        """The block that begins with row `first`."""
+        if self._latest[0] != first:
+            self._latest = first, self._make(first, min(first + self._at_once, self._n_rows))
+            if first in self._made:
+                self._kept[first] = self._latest[1]
+            self._made.add(first)
+        return self._latest[1]
+
+
 class Samples:
     """Samples of a PhaseHistory that are exchanged from one application to the next: `array` (n_rows, n_samples)."""
 
     def __init__(self, array: np.ndarray) -> None:
-        self.array, self.shape = array, array.shape
+        self.array: np.ndarray | RowsAsRead = array
+        self.shape = array.shape
 
     @property
     def dtype(self) -> np.dtype[np.complexfloating]:
@@ -89,10 +125,11 @@ class Measurement:
         """Whether a beam leaves out pixels of some rows, or a window has another weight in each pixel."""
         return self.task.antennas.beam is not None or self.task.taper is not None
 
-    def weighted(self, samples: np.ndarray) -> np.ndarray:
-        """Samples (n_rows, n_samples) times m, of their type."""
-        out = samples * self.rows.astype(samples.real.dtype)
-        out *= self.band
+    def weighted(self, samples: np.ndarray, start: int = 0) -> np.ndarray:
+        """Samples (n, n_samples) of rows from `start` on times m, of their type."""
+        rows = slice(start, start + len(samples))
+        out = samples * self.rows[rows].astype(samples.real.dtype)
+        out *= self.band if len(self.band) == 1 else self.band[rows]
         return np.asarray(out)
 
 
@@ -119,8 +156,13 @@ class Arguments:
         validation.choice("method", self.method, METHODS)
 
 
-def measurement_of(domain: Domain, like: PhaseHistory, arguments: Arguments) -> Measurement:
-    """The measurement for the arguments of `Echoes`; ValueError or TypeError for arguments that do not fit."""
+def measurement_of(
+    domain: Domain, like: PhaseHistory, arguments: Arguments, aimed: AntennaWeights | None = None
+) -> Measurement:
+    """The measurement for the arguments of `Echoes`; ValueError or TypeError for arguments that do not fit.
+
+    aimed  gains of arguments.antenna that are aimed already: only the places of the antennas are new
+    """
     antenna, beam, wrap = arguments.antenna, arguments.beam, bool(arguments.wrap)
     instance("like", like, PhaseHistory)
     grid = domain if isinstance(domain, ImageGrid) else ImageGrid.points(domain)
@@ -136,7 +178,9 @@ def measurement_of(domain: Domain, like: PhaseHistory, arguments: Arguments) -> 
     task = replace(task, row_weight=np.ones_like(rows), sample_weight=np.ones_like(across))
     if task.antennas.beam is not None and all_lit(task.antennas, grid):
         task = replace(task, antennas=geometry_of(raw, wrap))
-    if antenna is not None:
+    if aimed is not None:
+        task = replace(task, antenna=aimed.at(task.antennas))
+    elif antenna is not None:
         if not is_antenna(antenna):
             raise TypeError(f"antenna is a {type(antenna).__name__}; give an Antenna, or (antenna, aim)")
         center = grid.bounds.mean(axis=0) if grid.center is None else grid.center

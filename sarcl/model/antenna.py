@@ -267,13 +267,14 @@ class Antenna:
         y, z, behind = table_limits(self, level, float(self.ratio(frequency)))
         return np.array([y + COSINE, z + COSINE, behind])
 
-    def packed(self, frequency: float) -> np.ndarray:
-        """Numbers of kernels/pattern.clh, float32: a header, then the spline coefficients of a table.
+    def packed(self, frequency: float, dtype: type[np.floating] = np.float32) -> np.ndarray:
+        """Numbers of kernels/pattern.clh, float32, or gains_float64.clh: a header, then a table's spline coefficients.
 
         frequency  Hz at which the kernel's `ratio` is 1.
         """
-        numbers = np.zeros(HEADER, np.float32)
-        numbers[0] = np.array(KINDS.index(self.kind), np.int32).view(np.float32)
+        numbers = np.zeros(HEADER, dtype)
+        integers = numbers.view(f"i{numbers.itemsize}")
+        integers[0] = KINDS.index(self.kind)
         shrinks = self.kind == "aperture" or self.frequency is not None
         numbers[1:4] = self.amplitude, self.ratio(frequency), shrinks
         if self.kind == "aperture":
@@ -284,9 +285,9 @@ class Antenna:
         elif self.kind == "table":
             for i, axis in enumerate((self.azimuth, self.elevation)):
                 numbers[4 + 2 * i : 6 + 2 * i] = axis[0], (len(axis) - 1) / (axis[-1] - axis[0])
-            numbers[8:10] = np.array(self.values.shape, np.int32).view(np.float32)
-            weights = uniform_spline(uniform_spline(self.values).T).T
-            return np.concatenate([numbers, np.ascontiguousarray(weights, np.complex64).view(np.float32).ravel()])
+            integers[8:10] = self.values.shape
+            weights = np.ascontiguousarray(uniform_spline(uniform_spline(self.values).T).T, np.complex128)
+            return np.concatenate([numbers, weights.view(np.float64).ravel().astype(dtype)])
         return numbers
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from ..base.boxes import box
 from ..base.errors import ToleranceUnreachable
 from ..base.validation import instance
-from ..model.antenna import Antenna, pair_of
+from ..model.antenna import HEADER, Antenna, pair_of
 from ..model.radar import Radar, spreading
 from ..model.trajectory import Trajectory
 from ..model.waveform import Waveform
@@ -232,17 +232,19 @@ class AntennaWeights:
             "SPREADING": int(self.radar is not None),
         }
 
-    def upload(self, device: Device) -> tuple[Buffer, int]:
-        """Patterns on a device, one after the other, and the index at which the second begins."""
-        packed = [one.packed(self.frequency) for one in self.patterns] or [np.zeros(1, np.float32)]
+    def upload(self, device: Device, dtype: type[np.floating] = np.float32) -> tuple[Buffer, int]:
+        """Patterns on a device, one after the other, and the index at which the second begins; the last number of the
+        first header is that index too."""
+        packed = [one.packed(self.frequency, dtype) for one in self.patterns] or [np.zeros(HEADER, dtype)]
+        packed[0].view(f"i{packed[0].itemsize}")[HEADER - 1] = len(packed[0])
         return device.upload(np.concatenate(packed)), len(packed[0])
 
-    def packed_axes(self, pulses: np.ndarray) -> np.ndarray:
-        """Axes of both antennas at pulses (n,), one axis after another, float32 (n, 18), as kernels/gains.clh reads."""
+    def packed_axes(self, pulses: np.ndarray, dtype: type[np.floating] = np.float32) -> np.ndarray:
+        """Axes of both antennas at pulses (n,), one axis after another (n, 18), as kernels/gains.clh reads them."""
         if self.axes is None:
-            return np.zeros((1, 18), np.float32)
+            return np.zeros((1, 18), dtype)
         both = np.stack([a[pulses].swapaxes(1, 2) for a in self.axes], axis=1)
-        return np.ascontiguousarray(both, np.float32).reshape(-1, 18)
+        return np.ascontiguousarray(both, dtype).reshape(-1, 18)
 
 
 def _orthonormal(axes: np.ndarray) -> np.ndarray:

@@ -98,6 +98,7 @@ HOT = {
     ("spread_facets.cl", "spread_facets"): Hot("VW", "pulse and facet", loop="around", trips=("1",)),
     # each item brings a scatterer; the loop inside adds those of the group up, and runs again where a window moves
     ("spread_leaves.cl", "leaves"): Hot("VW", "kept pulse and point"),
+    ("row_gradients_float64.cl", "row_gradients"): Hot("VW", "pulse and point"),
     ("spread_float64.cl", "spread"): Hot("VW", "pulse and point"),
     ("spread_points.cl", "spread"): Hot("VW", "pulse and scatterer", loop="around", trips=("1",)),
 }

@@ -128,13 +128,15 @@ def rays() -> Any:
     return scene.nearest(-ends, ends), scene.any_hit(-ends, ends)
 
 
-def exact_operator(n_rows: int = 8) -> Any:
+def exact_operator(n_rows: int = 8, antenna: sarcl.Antenna | None = None) -> Any:
     """The transpose of float64 images, and gradients by everything that moves, of one antenna."""
     noise = np.ones((n_rows, 32), np.complex64)
     tx = np.array([-7e3, 0, 7e3]) + np.arange(n_rows)[:, None]
     raw = sarcl.PhaseHistory(noise, 9.5e9, 6e6, tx, np.linalg.norm(tx, axis=1))
-    operator = sarcl.linear.Echoes(sarcl.ImageGrid.plane(shape=(16, 16), spacing=0.2), raw, exact=True)
-    return operator.gradients(operator.H @ noise.ravel(), noise.ravel())
+    grid = sarcl.ImageGrid.plane(shape=(16, 16), spacing=0.2)
+    operator = sarcl.linear.Echoes(grid, raw, exact=True, antenna=antenna)
+    x = operator.H @ noise.ravel()
+    return operator.gradients(x, operator @ x)
 
 
 OWN: dict[str, Callable[[], Any]] = {
@@ -145,6 +147,7 @@ OWN: dict[str, Callable[[], Any]] = {
     },
     "rays": rays,
     "operator": exact_operator,
+    "operator with an antenna": partial(exact_operator, antenna=sarcl.Antenna.gaussian(width=0.1)),
     "range_doppler": lambda: range_doppler(1e-2),
     "spectral_echo": lambda: spectral(1e-2),
     "spectral_echo rough": lambda: spectral(1e-2, roughness=0.01),

@@ -79,6 +79,35 @@ def test_pylops_takes_the_operator_as_it_is():
     assert pylops.utils.dottest(wrapped, *A.shape, complexflag=3, rtol=1e-12)
 
 
+class Exchanged:
+    """An array of another library: it has numbers by DLPack alone, and none to copy."""
+
+    def __init__(self, array):
+        self.array, self.shape, self.loans = array, array.shape, 0
+
+    def __dlpack__(self, *, copy=None, **options):
+        assert not copy
+        self.loans += 1
+        return self.array.__dlpack__(**options)
+
+    def __dlpack_device__(self):
+        return self.array.__dlpack_device__()
+
+
+def test_arrays_come_by_dlpack_in_their_own_memory():
+    _, A = operator(tolerance=1e-6)
+    x, y = (Exchanged(random_vector(n, n)) for n in (6, 12))
+    for got, expected in (
+        (A @ x, A @ x.array),
+        (A.H @ y, A.H @ y.array),
+        (A.normal(x), A.normal(x.array)),
+        (A.A(Exchanged(x.array[None])), A.A(x.array[None])),
+        (A.gradients(x, y, of="tx")["tx"], A.gradients(x.array, y.array, of="tx")["tx"]),
+    ):
+        assert np.array_equal(got, expected)
+    assert (x.loans, y.loans) == (3, 2)
+
+
 @pytest.mark.parametrize("name", ["torch", "jax"])
 def test_a_missing_library_is_named_with_the_remedy(name, monkeypatch):
     monkeypatch.setitem(sys.modules, name, None)

@@ -11,16 +11,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from helpers.antenna_cases import everyone
 from helpers.cases import noise_history, noise_on, quick_of
 from scipy.sparse import csr_matrix
 
 import sarcl
 from sarcl.base.constants import SPEED_OF_LIGHT
+from sarcl.imaging.antenna_beam import antenna_of
 from sarcl.opencl.device import Device
 from sarcl.opencl.failures import DeviceFailed
 from sarcl.reference.equations import point_echo
 from sarcl.reference.linear import matrix, spread
 from sarcl.simulation import kernel_images
+from sarcl.simulation.points.direct import PointSpreader
 
 GRID = sarcl.ImageGrid.plane(shape=(17, 12), spacing=0.25)
 
@@ -66,6 +69,8 @@ def random_task(seed):
         options |= {"weights": random.random(n_rows) + 0.1, "window": "hamming"}
     if seed % 7 == 0:
         options["waveform"] = sarcl.Waveform.tone(center=9.6e9, duration=4e-9)
+    if seed % 8 == 3:
+        options["antenna"] = sarcl.Antenna.gaussian(width=0.5)
     return domain, like, options
 
 
@@ -190,6 +195,30 @@ def test_weights_windows_and_the_waveform_are_in_both_directions():
         assert max(errors(A, M, random_vector(A.shape[1]), random_vector(A.shape[0], 1))) < 1e-5
 
 
+@pytest.mark.parametrize("bistatic", [False, True])
+@pytest.mark.parametrize("name", ["tapered", "gaussian", "table that shrinks"])
+def test_antennas_weigh_both_directions_in_float64(name, bistatic, double):
+    """Gains at the centre of the band, in the matrix and in A; a beam cuts both."""
+    like = noise_history(n_rows=12, n_samples=24, distance=100.0, bandwidth=100e6, bistatic=bistatic)
+    gains = antenna_of(like, everyone()[name], np.zeros(3), "antenna")
+    share = np.stack([gains.weights(GRID.positions.reshape(-1, 3), p, gains.frequency) for p in range(12)], axis=1)
+    M = matrix(like, GRID.positions.reshape(-1, 3), share=share)
+    for options, gate in (({"exact": True, "tolerance": 1e-8}, 1e-12), ({"tolerance": 1e-9, "beam": 0.5}, 1e-9)):
+        A = sarcl.linear.Echoes(GRID, like, antenna=everyone()[name], device=double, **options)
+        x, y = (random_vector(n, k, np.complex128) for k, n in enumerate(A.shape[::-1]))
+        assert max(errors(A, M, x, y)) <= A.predicted_error <= A.tolerance
+        assert dot_error(A, kind=np.complex128) < gate
+
+
+def test_gains_that_float32_cannot_hold_take_the_pair_in_float64():
+    like = noise_history(n_rows=12, n_samples=24, distance=100.0, bandwidth=100e6)
+    A = sarcl.linear.Echoes(GRID, like, antenna=sarcl.Antenna.gaussian(width=0.05), tolerance=1e-6)
+    assert A.predicted_error <= 1e-6 and A.dtype == np.complex64
+    window = (None, "hann")
+    with pytest.raises(ValueError, match="leave one out"):
+        sarcl.linear.Echoes(GRID, like, antenna=sarcl.Antenna.isotropic(), beam=0.001, window=window)
+
+
 def test_antennas_weigh_both_directions():
     like = noise_history(n_rows=20, n_samples=24, distance=100.0, bandwidth=100e6)
     antenna = sarcl.Antenna.gaussian(width=0.1)
@@ -199,8 +228,6 @@ def test_antennas_weigh_both_directions():
     image = sarcl.backproject(replace(like, samples=random_vector(A.shape[0], 1).reshape(20, 24)), grid, beam=antenna)
     difference = A.H @ random_vector(A.shape[0], 1) - image.data.ravel()
     assert np.linalg.norm(difference) < 2e-3 * np.linalg.norm(image.data)
-    with pytest.raises(ValueError, match="leave out exact=True"):
-        sarcl.linear.Echoes(grid, like, antenna=antenna, exact=True)
 
 
 def test_it_is_the_verbs():
@@ -237,6 +264,31 @@ def test_memory_limits_change_nothing_but_rounding():
             assert np.linalg.norm(one - other) < 1e-6 * np.linalg.norm(one)
         one, other = (op.gradients(x, y, of="positions")["positions"] for op in (A, B))
         assert np.linalg.norm(one - other) < 1e-9 * np.linalg.norm(one)
+
+
+@pytest.mark.parametrize("options", [{}, {"exact": True}, {"max_bytes": 1e6}])
+def test_normal_makes_each_sample_once_and_in_blocks(options, monkeypatch):
+    """Of 256 rows at most; with little memory the image is made in parts, which read samples again."""
+    like, side = noise_history(n_rows=600, n_samples=16), 224 if "max_bytes" in options else 40
+    grid = sarcl.ImageGrid.plane(shape=(side, side), spacing=0.03)
+    A = sarcl.linear.Echoes(grid, like, weights=np.linspace(0.5, 1.5, 600), **{"method": "direct"} | options)
+    x, made, add = random_vector(grid.size), [], PointSpreader.add
+
+    def watched(self, samples, pulses, *rest):
+        made.append((pulses[0], pulses[-1] + 1))
+        return add(self, samples, pulses, *rest)
+
+    monkeypatch.setattr(PointSpreader, "add", watched)
+    got = A.normal(x)
+    monkeypatch.undo()
+    expected = A.H @ (A @ x)
+    assert np.linalg.norm(got - expected) < 1e-6 * np.linalg.norm(expected)
+    assert made == [(0, 256), (256, 512), (512, 600)] or options
+    assert max([b - a for a, b in made], default=0) <= 256
+    again = len(made) - len(set(made))
+    assert again <= len(set(made)) and (again > 0) == ("max_bytes" in options)
+    with pytest.raises(ValueError, match=r"x has shape \(3,\)"):
+        A.normal(np.ones(3))
 
 
 def test_empty_cells_of_a_grid_send_and_get_nothing():
@@ -407,7 +459,7 @@ def test_a_forked_process_is_refused():
 def test_an_operator_is_right_again_after_its_device_failed(exact, monkeypatch):
     A = sarcl.linear.Echoes(GRID, noise_history(n_rows=9, n_samples=16), exact=exact)
     x, y = random_vector(A.shape[1]), random_vector(A.shape[0], 1)
-    uses = (lambda: A @ x, lambda: A.H @ y, lambda: A.gradients(x, y, of="tx")["tx"])
+    uses = (lambda: A @ x, lambda: A.H @ y, lambda: A.normal(x), lambda: A.gradients(x, y, of="tx")["tx"])
     expected, run = [use() for use in uses], Device.run
 
     def lost(self, kernel, *arguments, **options):

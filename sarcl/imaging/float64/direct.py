@@ -18,6 +18,7 @@ from ...numerics.pulse_geometry import PulseGeometry
 from ...opencl.device import Device
 from ...opencl.device_list import devices
 from ...opencl.launch_numbers import launch_numbers
+from ..antenna_beam import GainsFloat64
 from ..engine import DirectEngine, RowProfiles, Skipped
 from ..focusing_task import FocusingTask
 from ..pixel_taper import WEIGHT_BUFFERS, TaperOnDevice
@@ -41,7 +42,7 @@ class DirectFloat64(DirectEngine):
         self.lanes = device.info.vector_width
         geometry = {"BISTATIC": int(not task.antennas.is_monostatic), "BEAM": int(task.antennas.beam is not None)}
         self.constants = device.kernel("tile_constants_float64.cl", "tile_constants", **geometry)
-        self.taper = TaperOnDevice(device, task, np.float64)
+        self.taper = weights_on(device, task)
         macros = {**geometry, **plan.macros(task.wrap), **self.taper.macros}
         self.kernel = device.kernel("backproject_float64.cl", "backproject", **macros)
         self.group = device.max_group(self.kernel)
@@ -127,12 +128,17 @@ class DirectFloat64(DirectEngine):
                         "backproject_float64.cl", "backproject", **tiles, **profiles, n_used=stop - start, pixels=pixels
                     )
                     buffers = block, self.table, pulse, constants, tile, pixels_at, image, missed
-                    device.run(self.kernel, size, group, launch, *buffers, *weights, steps=stop - start)
+                    device.run(self.kernel, size, group, launch, *buffers, *weights, block, steps=stop - start)
                 pipeline.step(partial(on_progress, stop))
                 clock.lap("backproject")
         clock.lap("backproject")
         values = download_sums(device, image, pixels, np.float64).reshape(positions.shape[:2])
         return values, device.download(missed, np.empty((2, n_tiles), np.int32)).astype(np.int64)
+
+
+def weights_on(device: Device, task: FocusingTask) -> GainsFloat64 | TaperOnDevice:
+    """Buffers of the weights that rows have in each pixel: gains of an antenna, a taper, or none."""
+    return TaperOnDevice(device, task, np.float64) if task.antenna is None else GainsFloat64(device, task)
 
 
 def _no_float64(device: Device) -> str:
