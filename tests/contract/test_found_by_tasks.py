@@ -309,3 +309,12 @@ def test_errors_that_add_up_in_phase_over_few_rows_are_planned_for(tolerance, de
         raw_here = replace(raw, samples=raw.samples + common)
         image = sarcl.backproject(raw_here, grid, tolerance=tolerance, method="direct", check=False, device=device)
         assert image_error(image, raw_here) <= image.report.predicted_error <= tolerance, away
+
+
+@pytest.mark.parametrize("n_samples", [3, 4, 5])
+def test_range_doppler_takes_rows_shorter_than_its_interpolation(n_samples):
+    """Rows of fewer samples than an interpolation reads on both sides ended in an IndexError of NumPy."""
+    tx = np.stack([np.full(32, -7e3), np.arange(32) - 16.0, np.full(32, 7e3)], axis=1) * [1, 0.05, 1]
+    raw = noise_on(tx, n_samples=n_samples, bandwidth=3e8, time=np.arange(32) * 1e-3)
+    report = sarcl.range_doppler(raw, side="right", tolerance=1e-2, check=True).report
+    assert report.measured_error <= report.predicted_error <= 1e-2
