@@ -86,11 +86,12 @@ def skipping(document: Row) -> bytes:
         width = np.array([100 * shares.get(why, 0.0) for _, shares in bars])
         color = "#d9d9d9" if why == "computed" else plots.COLORS[(i - 1) % len(plots.COLORS)]
         hatch = None if i <= len(plots.COLORS) else "//"
-        axes.barh([name for name, _ in bars], width, left=begin, color=color, hatch=hatch, label=why, edgecolor="white")
+        axes.barh(range(len(bars)), width, left=begin, color=color, hatch=hatch, label=why, edgecolor="white")
         begin += width
     axes.invert_yaxis()
     axes.set_axisbelow(True)
     axes.set_xlim(0, 100)
     plots.names(axes, "per cent of the pairs", "")
+    axes.set_yticks(range(len(bars)), [name for name, _ in bars])  # names() writes ticks as numbers
     axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=9, frameon=False)
     return plots.png(drawing)
