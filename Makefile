@@ -2,7 +2,7 @@
 # see .ci/setup.sh for what is looked for and what is installed.
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all fuzz tasks mutants gpu-static bench results architecture options site lint clean ready ready-dev
+.PHONY: help demo test test-all fuzz tasks mutants gpu-static bench proof results architecture options site lint clean ready ready-dev
 
 # Tests start hundreds of processes: each would compile the package again where bytecode is not kept.
 export PYTHONDONTWRITEBYTECODE :=
@@ -42,6 +42,13 @@ bench: ready  ## run time of every verb against the error achieved; images besid
 
 autofocus-trial: ready  ## autofocus on 200 random correct scenes, 200 with errors, 200 arms; bench/results/trials/autofocus.json
 	@.venv/bin/python bench/autofocus_trial.py --json bench/results/trials/autofocus.json $(ARGS)
+
+proof: ready  ## measure what docs/guide/proof.md shows, about 40 CPU minutes; then `make results` writes the page
+	@rm -f bench/results/trials/contract.json  # a trial continues where its file ends
+	@for run in contract_trial.py scaling.py 'faults_trial.py faults' 'faults_trial.py fuzz' 'faults_trial.py mutants' \
+	    roofline.py skipping.py; do .venv/bin/python bench/$$run || exit 1; done
+	@.venv/bin/python bench/memory.py --series 512 1024 2048 4096 8192 --tolerance 0.1 --max-bytes 1e8 --pulses 512 \
+	    --samples 1024 --json bench/results/trials/memory.json
 
 results: ready  ## the pages of results in docs/guide from bench/results/*.json
 	@.venv/bin/python bench/report.py

@@ -1,9 +1,11 @@
 """Peak memory of a large backprojection, raw data and image in files.
 
     python bench/memory.py [--pulses 2048] [--samples 4096] [--size 4096] [--max-bytes 5e8] [--compare]
+    python bench/memory.py --series 1024 2048 4096 8192 --max-bytes 1e8 --pulses 512 --samples 1024 --json FILE
 
-Prints the peak resident memory above that of an idle process with an open device, in GiB; with --compare also
-the relative difference from the image made in one block.
+Prints the peak resident memory above that of an idle process with an open device, in GiB; with --compare also the
+relative difference from the image made in one block. --series runs each size in a process of its own, after one
+that leaves its kernels in the driver's cache: a compiler takes memory too.
 """
 
 from __future__ import annotations
@@ -11,6 +13,8 @@ from __future__ import annotations
 import argparse
 import json
 import resource
+import subprocess
+import sys
 import tempfile
 from pathlib import Path
 
@@ -50,6 +54,27 @@ def write_raw(path: Path, n_pulses: int, n_samples: int) -> sarcl.PhaseHistory:
     )
 
 
+def series(args: argparse.Namespace) -> None:
+    """Peak memory of images of growing size, with the same limit and the same rows."""
+    options = ["--max-bytes", str(args.max_bytes), "--pulses", str(args.pulses), "--samples", str(args.samples)]
+    rows = []
+    for size in args.series:
+        command = [sys.executable, __file__, "--size", str(size), "--tolerance", str(args.tolerance), *options]
+        for _ in ("kernels are built", "measured"):
+            said = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+        rows.append({"size": size, "image_bytes": 8 * size**2, **json.loads(said.splitlines()[-1])})
+        print(rows[-1], flush=True)
+    words = f"--series {' '.join(map(str, args.series))} --tolerance {args.tolerance:g} {' '.join(options)}"
+    document = {
+        "kind": "memory",
+        "command": f"python bench/memory.py {words}",
+        "max_bytes": args.max_bytes,
+        "rows": rows,
+    }
+    if args.json:
+        args.json.write_text(json.dumps(document, indent=1) + "\n")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--device")
@@ -59,7 +84,12 @@ def main() -> None:
     parser.add_argument("--tolerance", type=float, default=1e-2)
     parser.add_argument("--max-bytes", type=float)
     parser.add_argument("--compare", action="store_true", help="focus again in one block and compare")
+    parser.add_argument("--series", type=int, nargs="+", help="sizes, each in a process of its own")
+    parser.add_argument("--json", type=Path, help="file of the series")
     args = parser.parse_args()
+    if args.series:
+        series(args)
+        return
     open_device(args.device)
     with tempfile.TemporaryDirectory() as folder:
         raw = write_raw(Path(folder, "raw.h5"), args.pulses, args.samples)

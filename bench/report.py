@@ -13,6 +13,7 @@ from typing import Any
 import channels_page
 import echo_page
 import full_wave_page
+import proof_page
 import spaceborne_page
 
 from sarcl.bench import pareto, ratios, tables, verb_pictures
@@ -58,7 +59,8 @@ README_HEAD = ["tolerance", "error achieved", "predicted", "seconds", "Gbp/s", "
 
 def write(folder: Path, docs: Path, readme: Path | None = None) -> list[Path]:
     """Write results.md (verbs), results_images.md and results_echoes.md into the folder `docs`, a picture
-    results-NAME.png beside them for each results/NAME.json of images and each verb, and the README's table.
+    results-NAME.png beside them for each results/NAME.json of images and each verb, and the README's table; and
+    proof.md with its pictures, where there is a folder of trials.
 
     Returns the files written. ValueError where there is no JSON file, or one of another format.
     """
@@ -83,6 +85,8 @@ def write(folder: Path, docs: Path, readme: Path | None = None) -> list[Path]:
     for page, text in pages.items():
         (docs / page).write_text(text.rstrip("\n") + "\n")
         written.append(docs / page)
+    if (folder / "trials").is_dir():
+        written += proof_page.write(folder, docs)
     if readme is not None:
         block = next((readme_table(d) for d in documents.values() if "cases" in d and "kind" not in d), "")
         text = readme.read_text()

@@ -2,10 +2,7 @@
 
 For other folders:
 
-    demo          `sarcl demo`: a spotlight pass over an airfield
-    fda/          `sarcl fda`: apertures of frequency-diverse arrays
-
-For this folder alone:
-
-    _demo_scene   the scene of the demo, an airfield
+    demo        `sarcl demo`: a spotlight pass over an airfield
+    demo_scene  the scene of the demo, an airfield
+    fda/        `sarcl fda`: apertures of frequency-diverse arrays
 """

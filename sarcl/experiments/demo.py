@@ -96,14 +96,14 @@ def run(
     from ..imaging.backproject import backproject
     from ..opencl.choose_device import open_device
     from ..simulation.echo import echo
-    from . import _demo_scene
+    from . import demo_scene
 
     start = time.perf_counter()
     picture, raw_file = outputs(out)
     opened = open_device(device)
     setting = QUICK if quick else FULL
     clock = _Clock(say)
-    scene = _demo_scene.scene(setting.edge, seed)
+    scene = demo_scene.scene(setting.edge, seed)
     clock.stage("scene", f"an airfield of {len(scene.triangles):,} facets, made by code")
     raw = echo(
         scene,

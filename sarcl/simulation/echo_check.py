@@ -182,8 +182,8 @@ def exact_light(part: FacetSet, antennas: PulseGeometry, pulse: int, frequencies
     index, waves = np.flatnonzero(part.lit_rows >= 0), 2 * np.pi * frequencies / SPEED_OF_LIGHT
     ends = [end[pulse] for end in antennas.ends]
     share, mean = np.empty((1, len(index))), np.empty((1, len(index), len(waves)), np.complex128)
-    for i, k in enumerate(index.tolist()):
-        occluders, others = part.lit_parts.occluders_at(pulse, int(part.lit_rows[k]))
-        facet, on_plane = part.triangles[k], part.lit_parts.on_plane
+    for i, row in enumerate(part.lit_rows[index].tolist()):
+        occluders, others = part.lit_parts.occluders_at(pulse, row)
+        facet, on_plane = part.lit_parts.facet_at(row), part.lit_parts.on_plane
         share[0, i], mean[0, i] = lit_part(facet, occluders, ends, waves, on_plane, others)
     return Light(index, np.maximum(share, 0), mean)

@@ -357,6 +357,10 @@ class LitParts:
             return self._occluders[some], None
         return self._occluders[some], bodies[some] != self._pieces.body[self._rows[row]]
 
+    def facet_at(self, row: int) -> np.ndarray:
+        """Corners of partly lit facet number `row`, m (3, 3), not moved by random heights, which shift no shadow."""
+        return np.asarray(self._pieces.triangles[self._rows[row]])
+
     @property
     def on_plane(self) -> float:
         """Distance, m, from the plane of a facet below which corners of occluders lie in it."""

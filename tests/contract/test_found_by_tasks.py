@@ -309,3 +309,26 @@ def test_errors_that_add_up_in_phase_over_few_rows_are_planned_for(tolerance, de
         raw_here = replace(raw, samples=raw.samples + common)
         image = sarcl.backproject(raw_here, grid, tolerance=tolerance, method="direct", check=False, device=device)
         assert image_error(image, raw_here) <= image.report.predicted_error <= tolerance, away
+
+
+@pytest.mark.parametrize("n_samples", [3, 4, 5])
+def test_range_doppler_takes_rows_shorter_than_its_interpolation(n_samples):
+    """Rows of fewer samples than an interpolation reads on both sides ended in an IndexError of NumPy."""
+    tx = np.stack([np.full(32, -7e3), np.arange(32) - 16.0, np.full(32, 7e3)], axis=1) * [1, 0.05, 1]
+    raw = noise_on(tx, n_samples=n_samples, bandwidth=3e8, time=np.arange(32) * 1e-3)
+    report = sarcl.range_doppler(raw, side="right", tolerance=1e-2, check=True).report
+    assert report.measured_error <= report.predicted_error <= 1e-2
+
+
+def test_random_heights_of_partly_lit_facets_shift_no_shadow_when_echoes_are_checked():
+    """check=True clipped a facet where its random height had moved it: the difference counted as an error."""
+    corners = [
+        [[0.0102, 0.0014, -0.0073], [-0.0176, 0.0041, -0.0167], [0.0426, -0.016, -0.021]],
+        [[0.0029, 0.0092, 0.003], [0.0066, 0.0011, 0.0112], [-0.0273, -0.0103, -0.0124]],
+    ]
+    scene = sarcl.Scene.facets(corners, roughness=3e-5, two_sided=False)
+    chirp = sarcl.Waveform.chirp(center=14.6e9, bandwidth=17e6, duration=3e-6)
+    track = sarcl.Trajectory.line(start=(-738, 0, 738), velocity=(0, 1, 0), prf=100, n_pulses=4)
+    report = sarcl.echo(scene, chirp, track, tolerance=6e-4, check=True).report
+    assert report.plan["partly lit facets"] > 0
+    assert report.measured_error <= report.predicted_error <= 6e-4

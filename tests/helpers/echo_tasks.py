@@ -70,6 +70,28 @@ def size_of(draw: Draw, waveform: Any, samples: float = 2000) -> float:
     return C / (2 * waveform.bandwidth) * draw.log(1e-3, samples / 10)
 
 
+def exact_points(raw: Any, scene: Any, waveform: Any, allowed: float, window: tuple[float, float] | None) -> None:
+    """Compare echoes of points, without weights of antennas, with the sum over the points."""
+    lit = np.isin(raw.polarization, ("HH", "VV"))
+    expect(not np.asarray(raw.samples)[~lit].any(), "points have echoes in HV or VH")
+    wanted, power = np.zeros(raw.samples.shape, np.complex128), 0.0
+    for p in np.flatnonzero(lit):
+        f = raw.frequency[p] + raw.frequency_step[p] * np.arange(raw.n_samples)
+        pulse = waveform.pulse_spectrum(f)
+        spectrum = abs(pulse) ** 2 if raw.compressed else pulse
+        off = half_path(raw.tx[p], raw.rx[p], scene.positions, raw.reference_range[p])
+        seen = np.ones(len(off), bool)
+        if window is not None:
+            clear = 1e-6 * (abs(off).max() + np.linalg.norm(raw.tx[p] - scene.positions[0]) * 1e-6)
+            if any((abs(off - end) < clear).any() for end in window):
+                return  # rounding may put a point on either side
+            seen = (off >= window[0]) & (off <= window[1])
+        a = scene.amplitudes * seen
+        wanted[p] = spectrum * exact_echo(scene.positions, a, f, raw.tx[p], raw.rx[p], raw.reference_range[p])
+        power += float((abs(spectrum) ** 2).sum() * (abs(a) ** 2).sum())
+    near(raw.samples, wanted, allowed, max(float(np.linalg.norm(wanted)), np.sqrt(power)), "samples")
+
+
 def points(draw: Draw) -> None:
     """Points against the echo equation; weights of antennas by check=True."""
     waveform, track, center = setting(draw)
@@ -84,25 +106,7 @@ def points(draw: Draw) -> None:
     if raw.samples.size * len(scene.positions) > MOST:
         raw = sarcl.echo(scene, waveform, track, check=True, **options)
         return within_report(raw, options["tolerance"])
-    lit = np.isin(raw.polarization, ("HH", "VV"))
-    expect(not np.asarray(raw.samples)[~lit].any(), "points have echoes in HV or VH")
-    wanted, power = np.zeros(raw.samples.shape, np.complex128), 0.0
-    for p in np.flatnonzero(lit):
-        f = raw.frequency[p] + raw.frequency_step[p] * np.arange(raw.n_samples)
-        pulse = waveform.pulse_spectrum(f)
-        spectrum = abs(pulse) ** 2 if raw.compressed else pulse
-        off = half_path(raw.tx[p], raw.rx[p], scene.positions, raw.reference_range[p])
-        seen = np.ones(len(off), bool)
-        if "range_window" in options:
-            clear = 1e-6 * (abs(off).max() + np.linalg.norm(raw.tx[p] - center) * 1e-6)
-            if any((abs(off - end) < clear).any() for end in options["range_window"]):
-                return None  # rounding may put a point on either side
-            seen = (off >= options["range_window"][0]) & (off <= options["range_window"][1])
-        a = scene.amplitudes * seen
-        wanted[p] = spectrum * exact_echo(scene.positions, a, f, raw.tx[p], raw.rx[p], raw.reference_range[p])
-        power += float((abs(spectrum) ** 2).sum() * (abs(a) ** 2).sum())
-    scale = max(float(np.linalg.norm(wanted)), np.sqrt(power))
-    return near(raw.samples, wanted, options["tolerance"], scale, "samples")
+    return exact_points(raw, scene, waveform, options["tolerance"], options.get("range_window"))
 
 
 def facets(draw: Draw) -> None:
@@ -193,6 +197,9 @@ def spectral(draw: Draw) -> None:
     raw = sarcl.spectral_echo(scene, chirp, track, check=True, **options)
     finite(raw.samples, "samples")
     within_report(raw, options["tolerance"])
+    points_alone = len(scene.triangles) == 0 and "antenna" not in options
+    if points_alone and raw.samples.size * len(scene.positions) <= MOST:
+        exact_points(raw, scene, chirp, options["tolerance"], None)
 
 
 def planned(draw: Draw) -> None:

@@ -48,6 +48,9 @@ FOREIGN = (
 )  # fmt: skip
 
 
+ratios: list[float] = []  # errors over what was allowed, of the task that runs: bench/contract_trial.py reads them
+
+
 class Wrong(Exception):
     """A result that is not what the reference or a law says."""
 
@@ -98,7 +101,14 @@ def near(found: Any, wanted: Any, allowed: float, scale: float | None = None, wh
     finite(found, what)
     size = float(np.linalg.norm(wanted)) if scale is None else scale
     off = float(np.linalg.norm((found - wanted).ravel()))
+    note(off, allowed * size)
     expect(off <= allowed * size * (1 + 1e-9), f"{what} is off by {off / (size or 1):.3g}, allowed {allowed:.3g}")
+
+
+def note(error: float, allowed: float) -> None:
+    """Keep the ratio of an error to what is allowed, unless nothing is."""
+    if allowed > 0:
+        ratios.append(error / allowed)
 
 
 def finite(values: Any, what: str = "result") -> None:
@@ -110,6 +120,7 @@ def within_report(made: Any, tolerance: float) -> None:
     report = made.report
     expect(report.predicted_error <= tolerance * (1 + 1e-9), f"predicted {report.predicted_error} above {tolerance}")
     if report.measured_error is not None:
+        note(report.measured_error, tolerance)
         expect(report.measured_error <= tolerance * (1 + 1e-9), f"measured {report.measured_error} above {tolerance}")
 
 

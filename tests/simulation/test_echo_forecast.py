@@ -105,6 +105,8 @@ def test_the_shares_of_shadows_that_are_sampled_bound_their_errors():
     for term, value in zip(told.error_terms, (named["points"], named["facets"], shadows), strict=True):
         assert value <= term.value
     assert told.predicted_error <= options["tolerance"] * (1 + 1e-12)
+    allotted = np.hypot(*(term.value for term in told.error_terms[1:]))  # of two parts, points and facets
+    assert allotted == pytest.approx(options["tolerance"] / np.sqrt(2), rel=1e-6)
 
 
 def test_a_run_does_not_plan_again_and_may_be_repeated(call, monkeypatch):

@@ -112,7 +112,7 @@ def uneven_energy(
         largest[i] = np.abs(samples).max()  # squares must neither overflow nor underflow
         profile = np.abs(np.fft.ifft(samples / (largest[i] or 1.0), length)) ** 2 * length**2
         power[i], energy[i] = profile[cells[i]], profile.mean()
-        sums = np.cumsum(np.concatenate([profile[-ABOUT * FINER :], profile, profile[: ABOUT * FINER + 1]]))
+        sums = np.cumsum(np.pad(profile, (ABOUT * FINER, ABOUT * FINER + 1), mode="wrap"))  # rows may be shorter
         about[i] = (sums[cells[i] + 2 * ABOUT * FINER] - sums[cells[i]]) / (2 * ABOUT * FINER)
     relative = (largest / (largest.max() or 1.0)) ** 2
     power, about, energy = power * relative[:, None], about * relative[:, None], energy * relative
