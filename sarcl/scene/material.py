@@ -120,6 +120,10 @@ class Material:
                 f"thickness is {self.thickness:g} m of a perfect conductor or a rough surface; give it to smooth "
                 "dielectrics, and to metals a conductivity"
             )
+        self._check_scattering()
+
+    def _check_scattering(self) -> None:
+        """TypeError or ValueError where a name is no string, or none of a model that goes with the rest."""
         for name in ("name", "scattering"):
             if not isinstance(getattr(self, name), str):
                 raise TypeError(f"{name} is a {type(getattr(self, name)).__name__}; give a string")
