@@ -17,6 +17,27 @@ WHOLE = 10_000  # planes: more than any grid has
 CASES = {"whole": (0, WHOLE), "16 planes at a time": (0, 16), "whole, layers": (10, WHOLE), "16, layers": (10, 16)}
 
 
+def measure(device, n, steps):
+    """Cells of a cube along x, y and z, and per case: Mcells per second, Mcells per CPU second, bytes per cell."""
+    from sarcl.fullwave.fields import Fields
+    from sarcl.fullwave.lattice import LANES, Lattice
+    from sarcl.fullwave.target import Target
+
+    grid = Lattice(0.01, (n, n, -(-n // LANES) * LANES), np.zeros(3))
+    runs = {name: Fields(device, grid, Target.nothing(), absorber=a, tile=t) for name, (a, t) in CASES.items()}
+    best = {name: np.full(2, np.inf) for name in CASES}
+    for _ in range(5):
+        for name, fields in runs.items():
+            start = time.perf_counter(), time.process_time()
+            for _ in range(steps // 8):
+                fields.advance(8)
+            device.finish()
+            best[name] = np.minimum(best[name], (time.perf_counter() - start[0], time.process_time() - start[1]))
+    cells = np.prod(grid.shape)
+    updates = cells * (steps // 8) * 8 / 1e6
+    return grid.shape, {name: (*(updates / best[name]), 24 * grid.component / cells) for name in CASES}
+
+
 def main() -> None:
     """Measure, and print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -25,9 +46,6 @@ def main() -> None:
     parser.add_argument("--device")
     asked = parser.parse_args()
 
-    from sarcl.fullwave.fields import Fields
-    from sarcl.fullwave.lattice import LANES, Lattice
-    from sarcl.fullwave.target import Target
     from sarcl.opencl.choose_device import open_device
 
     device = open_device(asked.device)
@@ -35,22 +53,9 @@ def main() -> None:
     print("| grid | case | Mcells/s | Mcells per two CPU s | bytes per cell |")
     print("|---|---|---|---|---|")
     for n in asked.cells:
-        grid = Lattice(0.01, (n, n, -(-n // LANES) * LANES), np.zeros(3))
-        runs = {name: Fields(device, grid, Target.nothing(), absorber=a, tile=t) for name, (a, t) in CASES.items()}
-        best = {name: np.full(2, np.inf) for name in CASES}
-        for _ in range(5):
-            for name, fields in runs.items():
-                started = time.perf_counter(), time.process_time()
-                for _ in range(asked.steps // 8):
-                    fields.advance(8)
-                device.finish()
-                took = time.perf_counter() - started[0], time.process_time() - started[1]
-                best[name] = np.minimum(best[name], took)
-        updates = np.prod(grid.shape) * (asked.steps // 8) * 8 / 1e6
-        for name, (wall, cpu) in best.items():
-            stored = 24 * grid.component / np.prod(grid.shape)
-            print(f"| {' x '.join(map(str, grid.shape))} | {name} | {updates / wall:.0f} | {2 * updates / cpu:.0f} | "
-                  f"{stored:.1f} |")  # fmt: skip
+        shape, rates = measure(device, n, asked.steps)
+        for name, rate in rates.items():
+            print(f"| {' x '.join(map(str, shape))} | {name} | {rate[0]:.0f} | {2 * rate[1]:.0f} | {rate[2]:.1f} |")
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 For other folders:
 
     backproject    images, beside peers
+    baseline       backprojection written in NumPy
     documents      documents of measurements: machine, devices and rows
     exact          the exact sum at some pixels
     fastsar_peer   runs in another environment, and imports nothing of sarcl
@@ -15,7 +16,6 @@ For other folders:
 
 For this folder alone:
 
-    _baseline      backprojection written in NumPy
     _cases         data of the benchmark
     _competitor    a program that is measured, and one run of it
     _measure       runs and times the competitors in turns

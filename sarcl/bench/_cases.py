@@ -54,9 +54,7 @@ class BenchCase:
 
     def errors(self, values: np.ndarray) -> tuple[float, float]:
         """Relative L2 error of an image's `values` at `at`: as docs/theory/accuracy.md says, and relative to |I|."""
-        wrong = float(np.linalg.norm(values - self.wanted))
-        own = float(np.linalg.norm(self.wanted))
-        return wrong / max(own, self.norm), wrong / own
+        return exact.relative(values, self.wanted, self.norm)
 
 
 def make(scene: str, n: int, data: str | None = None, pixels: int = 1024) -> BenchCase:

@@ -31,12 +31,12 @@ from ..scene.material import Material
 from ..scene.scene import Scene
 from ..scene.triangles import normals
 from . import exact
+from .exact import Errors
 
 CENTER = 9.6e9  # Hz, of all cases but those of arrays and the full wave
 CELL = 0.5  # m: range resolution of the chirp, and the spacing of scatterers and pixels in proportion
 CHIRP = Waveform.chirp(center=CENTER, bandwidth=SPEED_OF_LIGHT / (2 * CELL), duration=1e-6)
 CHECKED = 24  # samples or pixels compared with the exact result, where its cost grows with the task
-Errors = tuple[float, float]  # relative to the norm of docs/theory/accuracy.md, and to the norm of the exact result
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,12 +69,6 @@ class VerbTask:
     tolerances: tuple[float, ...] = (1e-1, 1e-2, 1e-3, 1e-4)
 
 
-def relative(values: np.ndarray, wanted: np.ndarray, norm: float) -> Errors:
-    """Errors of values against the exact ones, whose norm would be `norm` with random phases."""
-    wrong, own = float(np.linalg.norm(values - wanted)), float(np.linalg.norm(wanted))
-    return wrong / max(own, norm), wrong / own
-
-
 def measured(result: PhaseHistory) -> Errors:
     """Errors that the verb's own check measured, against the float64 reference."""
     assert result.report is not None and result.report.measured_error is not None  # check=True gives both
@@ -104,7 +98,7 @@ def sample_errors(raw: PhaseHistory, positions: np.ndarray, amplitudes: np.ndarr
             positions, amplitudes, np.array([f]), raw.tx[p], raw.rx[p], float(raw.reference_range[p])
         )[0]
         values[i] = raw.read(p, p + 1)[0, n]
-    return relative(values, wanted, float(np.sqrt(CHECKED) * np.linalg.norm(amplitudes)))
+    return exact.relative(values, wanted, float(np.sqrt(CHECKED) * np.linalg.norm(amplitudes)))
 
 
 def points(name: str, n: int) -> VerbCase:
@@ -163,7 +157,7 @@ def cross_section(name: str, n: int) -> VerbCase:
             for borders, shape in facing_borders(box.triangles, edges):
                 parts = np.append(parts, border_echo(borders, shape, f, (far, far), 1e7)[0, 0, 0])
             wanted[i] = parts.sum()
-        return relative(s[checked], wanted, 0.0)
+        return exact.relative(s[checked], wanted, 0.0)
 
     return VerbCase(name, n, 360 * len(box.triangles), call, compare)
 
@@ -240,7 +234,7 @@ def backprojected_image(name: str, n: int) -> VerbCase:
     index, places = grid.sample(CHECKED, seed=1)
 
     def compare(image: Image) -> Errors:
-        return relative(image.data[index], *exact.backproject(raw, places))
+        return exact.relative(image.data[index], *exact.backproject(raw, places))
 
     return VerbCase(name, n, n**3, functools.partial(verbs.backproject, raw, grid), compare)
 
@@ -251,7 +245,7 @@ def polar_image(name: str, n: int) -> VerbCase:
     index, places = grid.sample(CHECKED, seed=1)
 
     def compare(image: Image) -> Errors:
-        return relative(image.data[index], *polar_format(raw, places, np.zeros(3)))
+        return exact.relative(image.data[index], *polar_format(raw, places, np.zeros(3)))
 
     return VerbCase(name, n, n**3, functools.partial(verbs.polar_format, raw, grid), compare)
 
@@ -263,7 +257,7 @@ def range_doppler_image(name: str, n: int) -> VerbCase:
 
     def compare(image: Image) -> Errors:
         index, places = image.grid.sample(CHECKED, seed=1)
-        return relative(image.data[index], *exact.backproject(raw, places))
+        return exact.relative(image.data[index], *exact.backproject(raw, places))
 
     return VerbCase(name, n, n**3 // 2, functools.partial(verbs.range_doppler, raw), compare)
 

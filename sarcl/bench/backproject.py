@@ -14,7 +14,7 @@ import numpy as np
 
 from ..base.validation import choice, count
 from ..imaging.choose_method import METHODS
-from . import _baseline, _cases, _peers, _run_sarcl, tables
+from . import _cases, _peers, _run_sarcl, baseline, tables
 from ._competitor import Absent, Competitor
 from ._measure import Paces, alternate, measure
 from .documents import Document, Measuring, header, load
@@ -119,7 +119,7 @@ def _others(case: _cases.BenchCase, folder: Path, peer: _peers.Peer | None, sett
     """The NumPy baseline, and the peer where there is one."""
     others, backend, methods = [], setting.peer_backend, setting.methods
     if "direct" in methods:
-        others += _baseline.competitors(case)
+        others += baseline.competitors(case)
     if peer is not None:
         try:
             peer.load(folder)

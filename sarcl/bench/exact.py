@@ -14,6 +14,14 @@ from ..base.constants import SPEED_OF_LIGHT
 from ..model.phase_history import PhaseHistory
 from ..reference.geometry import half_path
 
+Errors = tuple[float, float]  # relative to the norm of docs/theory/accuracy.md, and to the norm of the exact result
+
+
+def relative(values: np.ndarray, wanted: np.ndarray, norm: float) -> Errors:
+    """Errors of values against the exact ones, whose norm would be `norm` with random phases."""
+    wrong, own = float(np.linalg.norm(values - wanted)), float(np.linalg.norm(wanted))
+    return wrong / max(own, norm), wrong / own
+
 
 def phases(delay: np.ndarray, frequency: float, step: float, n_samples: int) -> tuple[np.ndarray, np.ndarray]:
     """(coarse (m, c), fine (m, b)) with exp(+j 2 pi (frequency + n step) delay) = coarse[:, n // b] fine[:, n % b].

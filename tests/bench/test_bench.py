@@ -13,9 +13,9 @@ import pytest
 import report as page
 
 import sarcl
-from sarcl.bench import _baseline as numpy_baseline
 from sarcl.bench import _cases, _measure, _peers, _wait_idle, documents, exact, pareto, ratios, tables
 from sarcl.bench import backproject as bench
+from sarcl.bench import baseline as numpy_baseline
 from sarcl.bench._competitor import Absent, Competitor, Reading
 from sarcl.cli import parser
 from sarcl.figures import plots

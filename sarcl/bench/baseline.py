@@ -16,10 +16,10 @@ PAIRS = 8e6  # pulses x pixels of one run, which takes about a second
 FINER = 16  # samples of a range profile per 1/bandwidth
 
 
-def backproject(raw: PhaseHistory, points: np.ndarray) -> np.ndarray:
-    """Image, complex128 (m,), at points, m (m, 3): profiles by FFT, 16 times oversampled, linear interpolation."""
+def backproject(raw: PhaseHistory, points: np.ndarray, finer: int = FINER) -> np.ndarray:
+    """Image, complex128 (m,), at points, m (m, 3): profiles by FFT, `finer` times oversampled, linear interpolation."""
     n, step = raw.n_samples, raw.frequency_step[0]
-    length = FINER * n
+    length = finer * n
     middle = raw.frequency[0] + n // 2 * step
     place = (np.arange(length) - length // 2) / (length * step)  # s, delays of the samples of a profile
     image = np.zeros(len(points), np.complex128)
