@@ -160,7 +160,7 @@ def reported(result: object) -> Row:
     report = getattr(result, "report", None)
     if report is None:
         return {}
-    return {"predicted": report.predicted_error, "stages": report.seconds, "plan": dict(getattr(report, "plan", {}))}
+    return {"predicted": report.predicted_error, "stages": dict(report.seconds), "plan": dict(report.plan)}
 
 
 # Stages
