@@ -55,6 +55,8 @@ __kernel void row_gradients(row_gradients_numbers given, __global const double *
             point q = {x.x - (dv)tile[k], x.y - (dv)tile[n_tiles + k], x.z - (dv)tile[2 * n_tiles + k]};
             dv qq = fma(q.x, q.x, fma(q.y, q.y, q.z * q.z));
             point_path at = path_of(record, pulse, n, p, state, x, q, qq);
+            pattern_value sent, received;
+            if (MATCHED) gains_of(at, taper, aperture + 18 * p, &sent, &received);  // before values that it needs no longer fill registers
             dv w[TAPS], sine, cosine, g, h, u, v, a = LOAD(i, amplitudes), b = LOAD(i, amplitudes + pixels);
             lv j;
             tap_weights(first_tap(at.t, at.base, stride, origin, &j), table, w);
@@ -67,8 +69,6 @@ __kernel void row_gradients(row_gradients_numbers given, __global const double *
             dv re = fma(a, cosine, b * sine) * share, im = fma(b, cosine, -a * sine) * share;
             dv z_re = fma(re, u, im * v), z_im = fma(im, u, -re * v), slope = fma(re, g, im * h), turn = z_im;
             if (MATCHED) {
-                pattern_value sent, received;
-                gains_of(at, taper, aperture + 18 * p, &sent, &received);
                 turn = fma(z_re, sent.im, z_im * sent.re);
                 slope = fma(slope, sent.re, -fma(im, g, -re * h) * sent.im);
                 add_point(total + 2, z_re, moved_tx(at, sent.slope_re));
@@ -85,6 +85,7 @@ __kernel void row_gradients(row_gradients_numbers given, __global const double *
         }
     }
     sums += (get_global_id(1) * given.n_used + p) * N_SUMS;
+#pragma unroll
     for (int m = 0; m < N_SUMS; m++) {
         double lane[VW];
         STORE(total[m], 0, lane);

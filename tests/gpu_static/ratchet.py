@@ -20,6 +20,10 @@ NOT_ON_GPUS = {
     "trial.cl": "the trial of a device builds it, no plan does",
     "backproject_lines.cl": "a work-item owns a tile of pixels; plans for one lane per work-item do not choose it",
 }
+# kernels that may spill, as much as is recorded and no more, and why that costs little
+MAY_SPILL = {
+    "row_gradients_float64.cl": "with gains of antennas; 20 spills are few beside 3300 instructions a pulse and point",
+}
 RATCHETED = {"registers": "registers", "accumulators": "registers", "spills": "bytes or registers that spill",
              "stack": "bytes of stack", "local memory": "bytes of local memory",
              "instructions": "instructions per contribution"}  # fmt: skip
@@ -58,7 +62,7 @@ def limits(found: dict[str, Any]) -> list[str]:
                     out.append(f"{where} cannot be compiled or counted: {here['error']}")
                     continue
                 for name in ("spills", "stack"):
-                    if here.get(name):
+                    if here.get(name) and not (name == "spills" and variant.split()[0] in MAY_SPILL):
                         out.append(
                             f"{where}: {here[name]} {RATCHETED[name]}, wanted none. Keep arrays that are indexed by "
                             "variables out of the kernel, or in local memory"

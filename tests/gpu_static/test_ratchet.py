@@ -58,6 +58,18 @@ def test_what_no_gpu_should_run_is_named(figures, figure, words):
     assert said.startswith("a.cl FP64=1 TAPS=2: kernel sum on gfx90a") and words in said
 
 
+def test_kernels_that_may_spill_have_no_stack_and_spill_no_more_than_recorded(figures):
+    (file, *_) = ratchet.MAY_SPILL
+    sums = figures["a.cl FP64=1 TAPS=2"]
+    found = {f"{file} FP64=1": copy.deepcopy(sums)}
+    found[f"{file} FP64=1"]["sum"]["gfx90a"] |= {"spills": 8}
+    assert not ratchet.limits(found)
+    (said,), _ = ratchet.worse(found, {f"{file} FP64=1": sums})
+    assert "8 bytes or registers that spill, recorded" in said
+    found[f"{file} FP64=1"]["sum"]["gfx90a"] |= {"stack": 8}
+    assert len(ratchet.limits(found)) == 1
+
+
 def test_files_that_no_task_uses_and_reasons_that_hold_no_longer_are_named(figures):
     missing = [line for line in ratchet.coverage(figures) if "no task of tests/gpu_static/tasks.py" in line]
     assert any("kernels/backproject.cl" in line for line in missing)
