@@ -30,9 +30,13 @@ def cache() -> Path:
     return Path(platformdirs.user_cache_dir("sarcl")) / "gpu_static"
 
 
-def kept(key: Iterable[str], make: Callable[[], Any]) -> Any:
-    """What `make` returns, as JSON: from the cache where a run with the same key has left it there."""
-    digest = hashlib.sha256("\0".join(key).encode()).hexdigest()
+def digest_of(key: Iterable[str]) -> str:
+    """A name for what follows from some texts."""
+    return hashlib.sha256("\0".join(key).encode()).hexdigest()
+
+
+def kept(digest: str, make: Callable[[], Any]) -> Any:
+    """What `make` returns, as JSON: from the cache where a run with the same digest has left it there."""
     path = cache() / f"{digest}.json"
     try:
         return json.loads(path.read_text())
@@ -56,7 +60,7 @@ def _text(*names: str) -> list[str]:
 def variants() -> dict[Variant, Use]:
     """Programs that plans build, and what they do with them, on GPUs with and without float64."""
     files = [*(ROOT / "sarcl").rglob("*.py"), *(ROOT / "kernels").glob("*.cl*"), ROOT / "bench" / "output_hashes.py"]
-    found = kept([*_text("collect", "tasks"), *(path.read_text() for path in sorted(files))], _collect)
+    found = kept(digest_of([*_text("collect", "tasks"), *(path.read_text() for path in sorted(files))]), _collect)
     return {
         Variant.named(name): Use(names, {kernel: set(groups) for kernel, groups in launched.items()})
         for name, (names, launched) in found.items()
@@ -123,17 +127,21 @@ def _counted(variant: Variant) -> dict[str, Figures]:
     return out
 
 
-def figures(progress: Callable[[int, int], None]) -> dict[str, dict[str, Figures]]:
-    """{name of a variant: {kernel: figures}}, of kernels that tasks launch.
+def figures(progress: Callable[[int, int], None], record: dict[str, Any]) -> tuple[dict[str, Any], dict[str, str]]:
+    """{name of a variant: {kernel: figures}}, of kernels that tasks launch, and {name: digest of all they follow from}.
 
-    A program that a compiler refuses has its errors under the name of each kernel.
+    A program whose digest is in the record has the figures there. One that a compiler refuses has its errors under the
+    name of each kernel.
     """
     chosen = {variant: use for variant, use in variants().items() if use.groups}
-    versions = json.dumps(compilers.versions())
-    own = _text("compilers", "sass", "hot_loops")
+    common = [json.dumps(compilers.versions()), *_text("compilers", "sass", "hot_loops")]
+    digests = {variant.name: digest_of([*common, variant.name, source(variant.file)]) for variant in chosen}
 
     def one(variant: Variant) -> dict[str, Figures]:
-        return kept([versions, *own, variant.name, source(variant.file)], lambda: _counted(variant))
+        digest, known = digests[variant.name], record["figures"].get(variant.name, {})
+        if record.get("digests", {}).get(variant.name) == digest and set(chosen[variant].groups) <= set(known):
+            return {kernel: {k: v for k, v in found.items() if k != "group"} for kernel, found in known.items()}
+        return dict(kept(digest, lambda: _counted(variant)))
 
     out: dict[str, dict[str, Figures]] = {}
     with ThreadPoolExecutor() as pool:
@@ -144,4 +152,4 @@ def figures(progress: Callable[[int, int], None]) -> dict[str, dict[str, Figures
                 for kernel, groups in sorted(chosen[variant].groups.items())
             }
             progress(done, len(chosen))
-    return dict(sorted(out.items()))
+    return dict(sorted(out.items())), dict(sorted(digests.items()))

@@ -32,7 +32,7 @@ Record = dict[str, Any]
 
 
 def recorded() -> Record:
-    """{"tools": versions, "figures": {variant: {kernel: figures}}}, as committed."""
+    """{"tools": versions, "digests": {variant: text}, "figures": {variant: {kernel: figures}}}, as committed."""
     found: Record = json.loads(RECORD.read_text())
     return found
 
@@ -40,7 +40,9 @@ def recorded() -> Record:
 def text_of(record: Record) -> str:
     """JSON of a record: a line per target of each kernel."""
     lines = ["{", f' "tools": {json.dumps(record["tools"])},',
-             f' "first": {json.dumps(record["first"])},', ' "figures": {']  # fmt: skip
+             f' "first": {json.dumps(record["first"])},',
+             ' "digests": {', ",\n".join(f"  {json.dumps(k)}: {json.dumps(v)}" for k, v in record["digests"].items()),
+             " },", ' "figures": {']  # fmt: skip
     for i, (variant, kernels) in enumerate(record["figures"].items()):
         lines.append(f"  {json.dumps(variant)}: {{")
         for j, (kernel, found) in enumerate(kernels.items()):

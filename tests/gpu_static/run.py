@@ -1,6 +1,8 @@
 """What compilers say of the kernels on GPUs, without a GPU.
 
-    python tests/gpu_static/run.py             compile every program that plans build for GPUs, and compare figures
+    python tests/gpu_static/run.py             compile the programs that plans build for GPUs, those that are recorded
+                                               from the same text by the same compilers left out, and compare figures
+    python tests/gpu_static/run.py --all       compile every program
     python tests/gpu_static/run.py --record    the same, and write figures.json, variants.md and the tables of the page
     python tests/gpu_static/run.py --count FILE [MACRO=VALUE ...]    count one program: figures of every target, loops
     options: --text PATH (source text to compile in place of kernels/FILE), --keep FOLDER (PTX, cubin, listing)
@@ -56,20 +58,20 @@ def count(file: str, macros: list[str], text: str, folder: Path) -> int:
     return 1 if refused else 0
 
 
-def compare(record: bool) -> int:
-    """Compile everything; compare with the recorded figures, or record. 1 where something is worse or not allowed."""
+def compare(record: bool, everything: bool) -> int:
+    """Compile what has changed, or everything; compare with recorded figures, or record: 1 where one is not allowed."""
     start = time.monotonic()
 
     def progress(done: int, total: int) -> None:
         if sys.stderr.isatty():
             print(f"\r{done} of {total} programs", end="" if done < total else "\n", file=sys.stderr)
 
-    found = figures.figures(progress)
-    wrong = ratchet.limits(found) + ratchet.coverage(found)
     before = ratchet.recorded() if ratchet.RECORD.exists() else {"tools": {}, "figures": {}}
+    found, digests = figures.figures(progress, {"figures": {}} if record or everything else before)
+    wrong = ratchet.limits(found) + ratchet.coverage(found)
     below: list[str] = []
     if record:
-        now = {"tools": compilers.versions(), "first": figures.first(), "figures": found}
+        now = {"tools": compilers.versions(), "first": figures.first(), "digests": digests, "figures": found}
         ratchet.RECORD.write_text(ratchet.text_of(now))
         page.PAGE.write_text(page.written(page.PAGE.read_text(), now))
         page.VARIANTS.write_text(page.variants(now))
@@ -93,6 +95,7 @@ def compare(record: bool) -> int:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--record", action="store_true", help="write figures.json, variants.md and the page's tables")
+    parser.add_argument("--all", action="store_true", help="compile also what has not changed since it was recorded")
     parser.add_argument("--count", nargs="+", metavar=("FILE", "MACRO=VALUE"), help="count one program")
     parser.add_argument("--text", type=Path, help="source text to compile in place of kernels/FILE, #include expanded")
     parser.add_argument("--keep", type=Path, help="folder for PTX, machine code and nvdisasm's listing")
@@ -103,7 +106,7 @@ def main() -> int:
         print(exc, file=sys.stderr)
         return 2
     if not args.count:
-        return compare(args.record)
+        return compare(args.record, args.all)
     file, *macros = args.count
     text = args.text.read_text() if args.text else source(file)
     with tempfile.TemporaryDirectory() as scratch:

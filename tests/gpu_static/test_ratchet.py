@@ -5,7 +5,9 @@ from __future__ import annotations
 import copy
 
 import pytest
-from gpu_static import occupancy, page, ratchet
+from gpu_static import compilers, occupancy, page, ratchet
+from gpu_static import figures as figures_of
+from gpu_static.collect import Use, Variant
 from gpu_static.compilers import TARGETS
 
 
@@ -95,3 +97,27 @@ def test_the_record_is_json_and_is_what_the_page_shows():
 def test_occupancy_follows_registers_local_memory_and_groups(registers, local, group, share):
     """Values of NVIDIA's occupancy calculator for compute capability 9.0."""
     assert occupancy.nvidia("sm_90", registers, local, group) == share
+
+
+def test_programs_recorded_from_the_same_text_are_not_compiled_again(monkeypatch, tmp_path):
+    known, changed, other = (Variant("merge_subapertures.cl", (("TAPS", taps),)) for taps in (2, 4, 6))
+    use = Use(["task"], {"merge": {64}})
+    monkeypatch.setattr(figures_of, "variants", lambda: dict.fromkeys((known, changed, other), use))
+    monkeypatch.setattr(figures_of, "cache", lambda: tmp_path)
+    monkeypatch.setattr(compilers, "versions", lambda: {"ptxas": "1"})
+    monkeypatch.setattr(figures_of, "_counted", lambda variant: counted.append(variant) or {"merge": {"sm_90": {}}})
+    counted: list[Variant] = []
+    _, digests = figures_of.figures(lambda *_: None, {"figures": {}})
+    assert sorted(counted) == sorted([known, changed, other])
+    record = {"figures": {v.name: {"merge": {"group": 9, "sm_90": {"registers": 7}}} for v in (known, changed)}}
+    record["digests"] = {
+        known.name: digests[known.name],
+        changed.name: "of another text",
+        other.name: digests[other.name],
+    }
+    counted.clear()
+    for file in tmp_path.iterdir():
+        file.unlink()
+    found, again = figures_of.figures(lambda *_: None, record)
+    assert sorted(counted) == sorted([changed, other]) and again == digests
+    assert found[known.name] == {"merge": {"group": 64, "sm_90": {"registers": 7}}}
