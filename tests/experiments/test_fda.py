@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import re
 from dataclasses import replace
@@ -378,7 +379,8 @@ def test_the_command_writes_a_page_and_its_numbers(tmp_path, monkeypatch, capsys
 def test_a_page_without_its_extra_is_refused_with_the_command_to_install_it(tmp_path, monkeypatch, capsys, command):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "try.toml").write_text("[fda]\n")
-    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    find, absent = importlib.util.find_spec, ("matplotlib", "jinja2")
+    monkeypatch.setattr("importlib.util.find_spec", lambda name, *rest: None if name in absent else find(name, *rest))
     assert parser.main(command) == parser.FAILED
     said = capsys.readouterr().err
     assert "needs matplotlib and jinja2, of the extra plots: pip install 'sarcl[plots]'" in said
