@@ -88,8 +88,9 @@ def relative_error(
 def norm_of(data: Any) -> float:
     """Euclidean norm of an image's finite pixels, by blocks in float64: squares of float32 overflow from 2e19 on, and
     vanish below 1e-23."""
-    step = max(1, NORM_BLOCK * len(data) // max(1, np.prod(data.shape)))
-    blocks = (np.asarray(data[i : i + step]).astype(np.complex128) for i in range(0, len(data), step))
+    n = data.shape[0]
+    step = max(1, NORM_BLOCK * n // max(1, np.prod(data.shape)))
+    blocks = (np.asarray(data[i : i + step]).astype(np.complex128) for i in range(0, n, step))
     return float(np.sqrt(sum(np.linalg.norm(block[np.isfinite(block)]) ** 2 for block in blocks)))
 
 

@@ -160,7 +160,9 @@ def test_a_mapped_image_is_planned_as_it_is_made(tmp_path, capsys, monkeypatch):
         assert forecast.plan == dict(image.report.plan)
         assert forecast.predicted_error == image.report.predicted_error
         assert main(["focus", "raw.h5", *where, "--mapping", mapping, "--dry-run"]) == 0
-        said, wanted = (re.sub(r"[\d.e+-]+ s\b", "... s", text) for text in (capsys.readouterr().out, f"{forecast}\n"))
+        said, wanted = (
+            re.sub(r"[\d.e+-]+ m?s\b", "... s", text) for text in (capsys.readouterr().out, f"{forecast}\n")
+        )
         assert said.endswith(wanted)  # but for the time that planning took
         assert main(["focus", "raw.h5", *where, "--mapping", mapping, "-o", "image.h5"]) == 0
         assert (np.asarray(sarcl.read("image.h5").data) == image.data).all()

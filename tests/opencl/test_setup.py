@@ -361,7 +361,7 @@ def test_compilers_for_gpus_that_are_missing_are_named_with_the_line_that_instal
 
 def test_an_unknown_extra_is_refused(machine):
     status, said = machine.setup("tests")
-    assert status == 1 and "'tests' is no extra of this package: test, dev or gpu-static" in said
+    assert status == 1 and "'tests' is no extra of this package: test, dev, site or gpu-static" in said
 
 
 @pytest.mark.parametrize("script, shell", [(".ci/setup.sh", "sh"), (".ci/run", "bash")])

@@ -124,7 +124,7 @@ def test_facets_are_seen_by_every_channel():
     assert 0 < raw.report.measured_error < raw.report.predicted_error
     for n in range(4):
         own = sarcl.echo(
-            scene, sarcl.Waveform.tone(center=F0 + n * 200e6, duration=1e-3, bandwidth=1.0),
+            scene, sarcl.Waveform.tone(center=F0 + n * 200e6, duration=1e-3, bandwidth=3.0),
             sarcl.Trajectory(track.times, track.positions + array.positions[n]), receiver=track, reference=(0, 0, 0),
             range_window=(-0.3, 0.3), tolerance=1e-3,
         )  # fmt: skip
