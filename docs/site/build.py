@@ -19,7 +19,8 @@ from reference import menu, pages, public_name
 ROOT = Path(__file__).parents[2]
 SITE = ROOT / "out" / "site"
 CONTENTS = Path("docs/README.md")
-PICTURES = (".png", ".svg")
+BESIDE = ("README.md", "CHANGELOG.md", "CITATION.cff")  # docs
+FILES = (".png", ".svg", ".cff")  # that pages show or offer
 _ITEM = re.compile(r"^(?:\d+\.|-) \[([^\]]+)\]\(([^)#]+)\.(?:md|ipynb)\)", re.M)
 _CODE = re.compile(r"^(```.*?^```|#[^\n]*|    [^\n]*)$|(?<![\[`])`(sarcl\.[\w.]+)`(?!\])", re.M | re.S)
 _OUTSIDE = re.compile(r"\]\(((?:\.\./)+(?!README|CHANGELOG|docs/)[^)#]+\.md)")
@@ -28,8 +29,8 @@ _OUTSIDE = re.compile(r"\]\(((?:\.\./)+(?!README|CHANGELOG|docs/)[^)#]+\.md)")
 def stage(source: Path) -> None:
     """Write what Sphinx reads: copies of the pages with their pictures, and the reference."""
     shutil.rmtree(source, ignore_errors=True)
-    for path in [ROOT / "README.md", ROOT / "CHANGELOG.md", *(ROOT / "docs").rglob("*.*")]:
-        if path.suffix in (".md", *PICTURES):
+    for path in [*(ROOT / name for name in BESIDE), *(ROOT / "docs").rglob("*.*")]:
+        if path.suffix in (".md", *FILES):
             _copy(path, source / path.relative_to(ROOT))
             for link in _OUTSIDE.findall(path.read_text()) if path.suffix == ".md" else ():
                 page = (path.parent / link).resolve()
