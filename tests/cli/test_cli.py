@@ -397,6 +397,7 @@ def test_echoes_that_are_not_compressed_are_compressed_first(here, capsys):
     assert "compressing them first" in capsys.readouterr().out
 
 
+@pytest.mark.slow  # the packages of .ci/run make this picture for every change
 def test_the_demo_writes_its_picture_and_says_where(here, capsys):
     assert parser.main(["demo", "--quick", "--out", "made/here"]) == 0
     said = capsys.readouterr().out

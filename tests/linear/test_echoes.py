@@ -75,7 +75,7 @@ def random_task(seed):
 
 
 @pytest.mark.parametrize("tolerance", quick_of([1e-3], [1e-2, 1e-3, 1e-5]))
-@pytest.mark.parametrize("seeds", [range(6), pytest.param(range(6, 200), marks=pytest.mark.slow)])
+@pytest.mark.parametrize("seeds", [range(4), pytest.param(range(4, 200), marks=pytest.mark.slow)])
 def test_one_direction_is_the_adjoint_of_the_other(seeds, tolerance):
     worst = 0.0
     for seed in seeds:
@@ -97,7 +97,7 @@ def test_few_numbers_do_not_make_the_dot_test_worse(distance):
         assert max(dot_error(A, s) for s in range(4)) < 2e-5
 
 
-@pytest.mark.parametrize("seeds", [range(8, 14), pytest.param(range(200), marks=pytest.mark.slow)])
+@pytest.mark.parametrize("seeds", [range(8, 12), pytest.param(range(200), marks=pytest.mark.slow)])
 def test_exact_adjoints_are_exact_to_rounding(seeds):
     for seed in seeds:
         domain, like, options = random_task(seed)
@@ -195,8 +195,13 @@ def test_weights_windows_and_the_waveform_are_in_both_directions():
         assert max(errors(A, M, random_vector(A.shape[1]), random_vector(A.shape[0], 1))) < 1e-5
 
 
-@pytest.mark.parametrize("bistatic", [False, True])
-@pytest.mark.parametrize("name", ["tapered", "gaussian", "table that shrinks"])
+@pytest.mark.parametrize(
+    "name, bistatic",
+    quick_of(
+        [("gaussian", False), ("table that shrinks", True)],
+        [(name, two) for name in ("tapered", "gaussian", "table that shrinks") for two in (False, True)],
+    ),
+)
 def test_antennas_weigh_both_directions_in_float64(name, bistatic, double):
     """Gains at the centre of the band, in the matrix and in A; a beam cuts both."""
     like = noise_history(n_rows=12, n_samples=24, distance=100.0, bandwidth=100e6, bistatic=bistatic)

@@ -127,7 +127,10 @@ def direct_sum(scene, u_t, u_r, frequency):
     return out
 
 
-@pytest.mark.parametrize("receiver", [None, (np.radians([50, 100, 170, 280]), np.radians([40, 30, -10, 60]))])
+@pytest.mark.parametrize(
+    "receiver",
+    [None, pytest.param((np.radians([50, 100, 170, 280]), np.radians([40, 30, -10, 60])), marks=pytest.mark.slow)],
+)
 def test_a_scene_with_shadows_is_the_sum_over_its_facets(receiver):
     scene = shapes.box((1, 0.6, 0.5), material="concrete") + shapes.plate((2, 2), material="metal").moved((0, 0, -0.1))
     scene = scene + sarcl.Scene.facets(
