@@ -58,7 +58,7 @@ def unknown(key: str, known: list[str], what: str) -> str:
 
     close = get_close_matches(key, known, 1)
     guess = f"; did you mean {close[0]!r}?" if close else ";"
-    return f"unknown {what} {key!r}{guess} known: {', '.join(known)}"
+    return f"unknown {what} {key!r}{guess} known: {', '.join(known) or 'none'}"
 
 
 def shown(value: object, most: int = 60) -> str:

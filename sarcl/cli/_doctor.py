@@ -21,7 +21,7 @@ from ..opencl.doctor import Examination, Finding
 
 COLUMNS = 100  # of the screen
 SHOWN = ("numpy", "scipy", "pyopencl", "reikna")
-OF_TESTS = ("test", "gpu-static", "dev")  # extras that users of the package do not need
+OF_DEVELOPERS = ("test", "gpu-static", "dev", "site")  # extras that users of the package do not need
 CGROUPS = Path("/sys/fs/cgroup")
 CONCLUSIONS = {
     0: "sarcl works here, on the device with a star",
@@ -33,14 +33,20 @@ CONCLUSIONS = {
 def run(as_json: bool) -> int:
     """Print what was found; 0 where sarcl can work, 1 where a package is missing or old, 3 where no device works."""
     versions, extras, wrong = _packages()
-    found = doctor.examine()
-    found.findings += [*wrong, *_of_memory(), *_of_threads()]
-    status = 3 if not found.picked else 1 if any(finding.is_fault for finding in wrong) else 0
+    examination = doctor.examine()
+    examination.findings += [*wrong, *_of_memory(), *_of_threads()]
+    status = 3 if not examination.picked else 1 if any(finding.is_fault for finding in wrong) else 0
     if as_json:
-        document = {"status": status, "sarcl": __version__, "packages": versions, "extras": extras, **asdict(found)}
-        print(json.dumps(document | {"findings": [finding._asdict() for finding in found.findings]}, indent=1))
+        document = {
+            "status": status,
+            "sarcl": __version__,
+            "packages": versions,
+            "extras": extras,
+            **asdict(examination),
+        }
+        print(json.dumps(document | {"findings": [finding._asdict() for finding in examination.findings]}, indent=1))
     else:
-        print("\n".join([*_summary(versions, extras), *_of_opencl(found), "", CONCLUSIONS[status]]))
+        print("\n".join([*_summary(versions, extras), *_of_opencl(examination), "", CONCLUSIONS[status]]))
     return status
 
 
@@ -60,7 +66,7 @@ def _packages() -> tuple[dict[str, str], dict[str, bool], list[Finding]]:
         if not extra:
             versions[name] = version
             wrong |= {} if is_there else {f"{name}>={least}": version or "missing"}
-        elif extra not in OF_TESTS:
+        elif extra not in OF_DEVELOPERS:
             extras[extra] = extras.get(extra, True) and is_there
     texts = [f"{name} ({version})" for name, version in wrong.items()]
     remedy = f"pip install {' '.join(map(repr, wrong))}"
@@ -134,15 +140,15 @@ def _summary(versions: dict[str, str], extras: dict[str, bool]) -> list[str]:
     ]
 
 
-def _of_opencl(found: Examination) -> list[str]:
+def _of_opencl(examination: Examination) -> list[str]:
     """Lines on loader, drivers and devices, and each finding with its remedy."""
-    lines = [f"loader  {found.loader or 'not known'}"]
-    lines += [f"driver  {icd}: {library}" for icd, library in found.drivers]
-    for d in found.devices:
-        mark = "*" if d.index in found.picked else " "
+    lines = [f"loader  {examination.loader or 'not known'}"]
+    lines += [f"driver  {icd}: {library}" for icd, library in examination.drivers]
+    for d in examination.devices:
+        mark = "*" if d.index in examination.picked else " "
         state = f"works, {'' if d.fp64 else 'no '}float64" if d.works else "does not work"
         lines.append(f"device {mark}{d.index}: {d.name:.36}, {d.platform:.28}, {size_text(d.memory)}: {state}")
-    for number, finding in enumerate(found.findings, 1):
+    for number, finding in enumerate(examination.findings, 1):
         what = f"{number}. {'' if finding.is_fault else 'note: '}{finding.what}"
         lines += ["", *_wrapped(what, "   "), *_wrapped(f"   -> {finding.remedy}", "      ")]
     return lines

@@ -70,11 +70,11 @@ def wheel() -> Path | None:
 
 def drivers() -> list[Driver]:
     """The drivers that the loader is told of, by OCL_ICD_VENDORS or OPENCL_VENDOR_PATH where one is set."""
-    usual = Path(sys.prefix, "etc/OpenCL/vendors") if Path(sys.prefix, "conda-meta").is_dir() else VENDORS
-    place = Path(os.environ.get("OCL_ICD_VENDORS") or os.environ.get("OPENCL_VENDOR_PATH") or usual)
+    default_folder = Path(sys.prefix, "etc/OpenCL/vendors") if Path(sys.prefix, "conda-meta").is_dir() else VENDORS
+    place = Path(os.environ.get("OCL_ICD_VENDORS") or os.environ.get("OPENCL_VENDOR_PATH") or default_folder)
     files = [place] if place.suffix == ".icd" else [p for f in (place, wheel()) if f for p in sorted(f.glob("*.icd"))]
-    found = []
+    drivers_of_files = []
     for file in files:
         with contextlib.suppress(OSError):
-            found.append(Driver(file, file.read_text(errors="replace").partition("\n")[0].strip()))
-    return found
+            drivers_of_files.append(Driver(file, file.read_text(errors="replace").partition("\n")[0].strip()))
+    return drivers_of_files

@@ -47,15 +47,15 @@ def put_into(
     ValueError, with the name of the model, for S of another shape, or that is not finite.
     """
     for number, material in enumerate(kinds[0]):
-        some, name = np.flatnonzero(kinds[1] == number), material.scattering
-        if not name or not len(some):
+        facets, name = np.flatnonzero(kinds[1] == number), material.scattering
+        if not name or not len(facets):
             continue
-        normal, to_tx, to_rx = (a[some] for a in looks)
+        normal, to_tx, to_rx = (a[facets] for a in looks)
         s = np.asarray(_model(name, tuple(sys.path))(normal, to_tx, to_rx, frequencies, up, material))
-        if s.shape != (len(frequencies), len(some), 2, 2):
-            wanted = (len(frequencies), len(some), 2, 2)
+        if s.shape != (len(frequencies), len(facets), 2, 2):
+            wanted = (len(frequencies), len(facets), 2, 2)
             raise ValueError(f"the scattering model {name!r} gave an array of shape {s.shape}, wanted {wanted}")
         validation.finite(f"values of the scattering model {name!r}", s)
-        lit = factor[:, some] * lit_share(normal, to_tx, to_rx, forward)
+        lit = factor[:, facets] * lit_share(normal, to_tx, to_rx, forward)
         for i, (r, t) in enumerate(sides):
-            out[:, some, i] = lit * s[..., r, t]
+            out[:, facets, i] = lit * s[..., r, t]

@@ -163,9 +163,9 @@ class Crsd:
 def pairs(values: np.ndarray, more: np.ndarray | float = 0.0) -> np.ndarray:
     """Whole numbers and fractions, 0 <= fraction < 1, of values + more: as exact as `more` where values are large."""
     out = np.zeros(len(values), PAIR)
-    whole = np.floor(values)
-    part = values - whole + more
-    out["Int"], out["Frac"] = whole + np.floor(part), part - np.floor(part)
+    integers = np.floor(values)
+    part = values - integers + more
+    out["Int"], out["Frac"] = integers + np.floor(part), part - np.floor(part)
     out["Int"] += out["Frac"] >= 1
     out["Frac"][out["Frac"] >= 1] = 0.0
     return out
