@@ -24,7 +24,7 @@ For other folders:
 For this folder alone:
 
     _checked_rows  rows of an HDF5 file, whose checksums are compared when they are read
-    _checksums     checksums of sarcl's own HDF5 file, behind its end
+    _checksums     checksums of HDF5 and NetCDF files, behind their end
     _gotcha        AFRL Gotcha volumetric SAR data set, MATLAB 5
     _hdf5_safety   HDF5 files that lead into others: refused
     _mat5_checks   the structure of a MATLAB 5 file, walked before scipy reads it

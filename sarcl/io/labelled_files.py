@@ -2,7 +2,7 @@
 
 The datasets are those of sarcl/model/_labelled.py, which hold every field of an Image. NetCDF has no complex numbers:
 there data is data_real and data_imag. A report or XML of more than 60 kB is a variable there: no
-attribute of NetCDF holds it.
+attribute of NetCDF holds it. NetCDF files have checksums behind their end (_checksums.py), which other readers ignore.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import hdf5, output_paths
+from . import _checksums, hdf5, output_paths
 from .formats import Make, T, is_zarr
 
 if TYPE_CHECKING:
@@ -70,7 +70,17 @@ def write(path: PathLike, dataset: xarray.Dataset) -> None:
     for name in [name for name in ("report", "metadata") if len(dataset.attrs.get(name, "")) > LONGEST]:
         dataset = dataset.assign({name: ((), dataset.attrs[name])})
         del dataset.attrs[name]
-    output_paths.put_in_place(target, lambda new: dataset.to_netcdf(new, engine="h5netcdf"))
+    output_paths.put_in_place(target, lambda new: _write_netcdf(new, dataset))
+
+
+def _write_netcdf(path: Path, dataset: xarray.Dataset) -> None:
+    """Write a NetCDF file with checksums behind its end, as sarcl's HDF5 files have them."""
+    import h5py
+
+    dataset.to_netcdf(path, engine="h5netcdf")
+    with h5py.File(path, "r", locking="best-effort") as file:
+        sums = _checksums.layout(file, file.id.get_filesize(), "", None)
+    _checksums.append(path, sums)
 
 
 def load(path: Path, make: Make[T]) -> T:

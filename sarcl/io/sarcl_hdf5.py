@@ -48,30 +48,29 @@ def load(path: PathLike, make: Make[T], external: bool = False) -> T:
     try:
         try:
             mark, version = file.attrs.get("sarcl_file"), file.attrs.get("format")
+            is_netcdf = "_NCProperties" in file.attrs  # NetCDF-4
         except (KeyError, OSError, RuntimeError, TypeError, ValueError) as exc:
             raise ValueError(f"{name!r} is damaged: its attributes cannot be read ({exc}); copy it again") from None
-        if "_NCProperties" in file.attrs:  # NetCDF-4
-            if not external:
-                _hdf5_safety.check_links(file)
-            file.close()
-            return labelled_files.load(Path(path), make)
-        if not isinstance(mark, str) or mark not in ROWS or version is None:
+        if not is_netcdf and (not isinstance(mark, str) or mark not in ROWS or version is None):
             raise ValueError(f"{name!r} is HDF5 but not sarcl's (it has no sarcl_file mark); sarcl reads what it saved")
-        if np.ndim(version) or version != hdf5.FORMAT:
+        if not is_netcdf and (np.ndim(version) or version != hdf5.FORMAT):
             raise ValueError(f"{name!r} has format {version}, this sarcl reads format {hdf5.FORMAT}; update sarcl")
-        kind, rows = ROWS[mark]
+        kind, rows = ROWS["image" if is_netcdf else mark]
         try:
             if not external:
                 _hdf5_safety.check_links(file)
-            dataset = _with_checksums(file[rows], sums)
-            fields = {**hdf5.get_all(file, leave=("report", rows)), rows: dataset, "report": hdf5.get_report(file)}
-            return make(kind, fields)
+            if not is_netcdf:
+                dataset = _with_checksums(file[rows], sums)
+                fields = {**hdf5.get_all(file, leave=("report", rows)), rows: dataset, "report": hdf5.get_report(file)}
+                return make(kind, fields)
         except _hdf5_safety.Refused as exc:
             raise ValueError(f"{name!r} {exc}") from None
         except MemoryError as exc:
             raise MemoryError(f"{name!r} holds arrays too large for memory ({exc}); read it elsewhere") from None
         except Exception as exc:  # h5py, json and the objects that are made fail in many ways on a damaged file
             raise ValueError(f"{name!r} is damaged: it holds no whole {kind} ({exc}); save or copy it again") from exc
+        file.close()
+        return labelled_files.load(Path(path), make)
     except BaseException:
         file.close()
         raise

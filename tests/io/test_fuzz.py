@@ -24,7 +24,10 @@ import sarcl
 from sarcl.experiments.fda import file as experiment
 from sarcl.scenario import scenario
 
-pytestmark = pytest.mark.skipif(not hasattr(os, "fork") or not Path("/proc/self/statm").exists(), reason="Linux alone")
+pytestmark = [
+    pytest.mark.skipif(not hasattr(os, "fork") or not Path("/proc/self/statm").exists(), reason="Linux alone"),
+    pytest.mark.filterwarnings("ignore:(read|open)_text is deprecated:DeprecationWarning"),  # within sarkit
+]
 QUICK = 40  # mutations per format
 BOX = trimesh.creation.box((1, 2, 3))
 STATE = """<OSV><UTC>UTC=2021-12-23T05:{0:02d}:00.000000</UTC><X unit="m">{1}</X><Y unit="m">{2}</Y>
@@ -45,6 +48,11 @@ def raw_file(path):
 def image_file(path):
     grid = sarcl.ImageGrid.plane(shape=(6, 4), spacing=0.1)
     sarcl.Image(np.arange(24, dtype=np.complex64).reshape(6, 4), grid, gain=2.0).save(path)
+
+
+def netcdf_file(path):
+    pytest.importorskip("h5netcdf", reason="no h5netcdf: pip install sarcl[xarray]")
+    image_file(path)
 
 
 def gotcha_file(path):
@@ -80,6 +88,44 @@ def raster_file(path):
 def virtual_raster_file(path):
     raster_file(path.with_name("beside.tif"))
     path.write_text(VIRTUAL)
+
+
+def product_source():
+    """Echoes of 5 short chirps of an aircraft, Earth-fixed, and metadata that products need."""
+    pytest.importorskip("sarkit", reason="no sarkit: pip install sarcl[formats]")
+    tx = sarcl.wgs84.ecef(8.5, 47.2 + 1e-6 * np.arange(5.0), 6e3)
+    center = sarcl.wgs84.ecef(8.4, 47.2, 420.0)
+    raw = sarcl.PhaseHistory(
+        np.exp(1j * np.arange(5 * 9)).reshape(5, 9).astype(np.complex64), frequency=9.596e9, frequency_step=1e6, tx=tx,
+        reference_range=np.linalg.norm(tx - center, axis=1), time=1e-3 * np.arange(5), polarization=["VH"] * 5,
+        tx_velocity=np.gradient(tx, 1e-3, axis=0), rx_velocity=np.gradient(tx, 1e-3, axis=0),
+        waveform=sarcl.Waveform.chirp(center=9.6e9, bandwidth=9e6, duration=1e-6),
+    )  # fmt: skip
+    return raw, {**PRODUCT, "SRPPos": center}
+
+
+def cphd_file(path):
+    raw, words = product_source()
+    raw.save(path, metadata=words, domain="TOA" if path.name.startswith("toa") else "FX")
+
+
+def crsd_file(path):
+    raw, words = product_source()
+    raw.save(path, metadata={**words, **CRSD})
+
+
+def sicd_file(path):
+    raw, words = product_source()
+    grid = sarcl.ImageGrid.plane(center=words["SRPPos"], shape=(4, 3), normal=words["SRPPos"] / 6.37e6, spacing=20.0)
+    image = sarcl.backproject(raw, grid)
+    image.save(path, collection=raw, metadata={n: words[n] for n in PRODUCT if n != "ReleaseInfo"})
+
+
+def map_file(path):
+    pytest.importorskip("rasterio", reason="no rasterio: pip install sarcl[maps]")
+    grid = sarcl.ImageGrid.on_map("EPSG:32633", bounds=(291000, 4641000, 291010, 4641012), spacing=2.0, heights=90.0)
+    data = np.exp(1j * np.arange(np.prod(grid.shape))).reshape(grid.shape).astype(np.complex64)
+    sarcl.Image(data, grid, gain=2.0, time=[0.0, 1.0], frequency=9.6e9).save(path)
 
 
 def orbit_file(path):
@@ -121,6 +167,12 @@ mappings = ["channels"]
 [sweep]
 aperture = [100.0, 430.0]
 """
+PRODUCT = {
+    "CollectorName": "sarcl", "CoreName": "targets", "ModeType": "SPOTLIGHT", "Classification": "UNCLASSIFIED",
+    "ReleaseInfo": "UNRESTRICTED", "CollectionStart": "2026-01-02T03:04:05.250000",
+}  # fmt: skip
+CRSD = {"TxRefRadIntensity": 1e6, "TxRadIntErrorStdDev": 0.1, "TxRefLAtm": 0.2, "RcvRefIrradiance": 1e-9}
+CRSD |= {"RcvIrradianceErrorStdDev": 0.1, "RcvRefLAtm": 0.2, "PNCRSD": 1e-3, "BNCRSD": 0.9}
 VIRTUAL = """\
 <VRTDataset rasterXSize="5" rasterYSize="6"><SRS>EPSG:4326</SRS>
 <GeoTransform>12, 0.001, 0, 42, 0, -0.001</GeoTransform>
@@ -130,6 +182,7 @@ VIRTUAL = """\
 </SimpleSource></VRTRasterBand></VRTDataset>
 """
 FIRST = 564578582964  # case of the slow tests, where SARCL_FUZZ_CASES asks for no others
+CHECKED = ".h5", ".nc"  # files with checksums
 CORPUS = Path(os.environ.get("SARCL_FUZZ_CORPUS") or Path(__file__).parent / "corpus")
 
 # name of the file: what writes it, what reads it
@@ -151,6 +204,12 @@ FORMATS = {
     "heights.asc": (raster_file, read_heights),
     "heights.vrt": (virtual_raster_file, read_heights),
     "orbit.EOF": (orbit_file, sarcl.Orbit.read),
+    "map.tif": (map_file, sarcl.read),
+    "pass.cphd": (cphd_file, sarcl.read),
+    "toa.cphd": (cphd_file, sarcl.read),
+    "pass.crsd": (crsd_file, sarcl.read),
+    "image.nitf": (sicd_file, sarcl.read),
+    "image.nc": (netcdf_file, sarcl.read),
 }  # fmt: skip
 
 
@@ -164,7 +223,7 @@ def digest(value):
                 found.update(field.name.encode())
                 add(getattr(part, field.name))
         elif hasattr(part, "dtype") and hasattr(part, "shape"):
-            rows = np.asarray(part[...])
+            rows = np.asarray(part[:] if part.shape else part)
             found.update(f"{rows.dtype} {rows.shape}".encode() + rows.tobytes())
         elif isinstance(part, (list, tuple)):
             for one in part:
@@ -199,7 +258,7 @@ def fuzzed(folder, name, cases):
             return fuzz.refusal(exc, path.name)
         return "right" if found == wanted else "other data"
 
-    allowed = {"right", "refused"} | (set() if name.endswith(".h5") else {"other data"})
+    allowed = {"right", "refused"} | (set() if name.endswith(CHECKED) else {"other data"})
     logging.disable(logging.CRITICAL)
     try:
         found = fuzz.outcomes(cases, judge, lambda case, said: said in allowed or kept(name, fuzz.mutated(whole, case)))
@@ -243,7 +302,7 @@ def test_inputs_that_have_failed_are_read_right_or_refused(tmp_path, path):
         return "read"
 
     found = fuzz.outcomes([0], judge)
-    assert set(found) <= {"refused"} | (set() if name.endswith(".h5") else {"read"}), f"{path}: {dict(found)}"
+    assert set(found) <= {"refused"} | (set() if name.endswith(CHECKED) else {"read"}), f"{path}: {dict(found)}"
 
 
 def test_an_input_that_fails_is_saved_once_and_by_its_content(tmp_path, monkeypatch):

@@ -152,6 +152,29 @@ def test_bad_datasets_are_refused_in_words(tmp_path):
         sarcl.read(tmp_path / "cut.zarr")
 
 
+def test_netcdf_files_have_checksums_which_other_programs_remove_and_damage_is_refused_without_them(tmp_path):
+    h5py, path = pytest.importorskip("h5py"), tmp_path / "image.nc"
+    PLANE.save(path)
+    data = bytearray(path.read_bytes())
+    place = data.index(PLANE.data.real.tobytes())
+    data[place] ^= 1
+    path.write_bytes(data)
+    with pytest.raises(ValueError, match="is damaged: data_real is not as it was written"):
+        sarcl.read(path)
+    with h5py.File(path, "r+") as file:
+        file["data_real"][0, 0] = 7.0
+    assert sarcl.read(path).data[0, 0].real == 7.0
+    changed = path.read_bytes()
+    path.write_bytes(changed.replace(b"OHDR", b"OHDX"))
+    with pytest.raises(ValueError, match=r"image\.nc' is damaged"):
+        sarcl.read(path)
+    path.write_bytes(changed)
+    with h5py.File(path, "r+") as file:
+        file["more"] = h5py.ExternalLink("other.nc", "/data")
+    with pytest.raises(ValueError, match=r"image\.nc' leads into another file"):
+        sarcl.read(path)
+
+
 @pytest.mark.parametrize("missing", ["xarray", "zarr", "h5netcdf"])
 def test_a_missing_package_is_an_error_that_names_the_extra(tmp_path, monkeypatch, missing):
     original = builtins.__import__
