@@ -30,6 +30,9 @@ if TYPE_CHECKING:
 
 # tags of sarcl's files that are numbers: fields of an image by their names, and the size of each
 NUMBERS = {"band": 2, "time": 2, "tx": 3, "rx": 3, "tx_velocity": 3, "rx_velocity": 3}
+# bands of heights above the ellipsoid, m, whose sum counts: float32 holds 48 bits of a height in two numbers
+HEIGHTS = "height", "height remainder"
+DIGITS = 8  # of a height in metres: finer than positions in float64 are
 LEVEL = 0.1  # m, by which heights of pixels may differ that are taken for one: level planes follow no ellipsoid
 SAME = 1e-6  # pixels, by which the axes in the tags may differ from those of the file: rounding of its corner
 TILE = 512  # pixels along a tile's side, and rows that are written at once
@@ -116,6 +119,8 @@ def _write_level(path: Path, header: MapImage, blocks: Iterable[np.ndarray]) -> 
         file.update_tags(**header.tags)
         for i, name in enumerate(header.bands, 1):
             file.set_band_description(i, name)
+            if name in HEIGHTS:
+                file.set_band_unit(i, "m")
         row = 0
         for block in blocks:
             file.write(block, window=Window(0, row, block.shape[2], block.shape[1]))
@@ -168,7 +173,7 @@ def load(path: Path, make: Make[T]) -> T:
     """make("image", fields) of a map: one of sarcl's, or of complex pixels in one band of a north-up map with a CRS.
 
     Amplitudes and decibels become intensities; pixels without data 0, where the gain is 0. fields["grid"] has the CRS,
-    `map_axes`, and one height for all pixels.
+    `map_axes`, and a height for each pixel where the file has them, else one for all.
     ValueError, which names the file: truncated, damaged, without a CRS, rotated, pixels of unknown meaning. OSError:
     it changed while it was read. ImportError without rasterio.
     """
@@ -186,7 +191,7 @@ def load(path: Path, make: Make[T]) -> T:
         if stamp(opened) != before:
             raise OSError(f"{name} has changed while it was read; read it again with sarcl.read")
     low, high = fields.pop("heights")
-    if not high - low <= LEVEL:
+    if np.ndim(fields["grid"]["height"]) == 0 and not high - low <= LEVEL:
         known = "does not say the heights of its pixels" if np.isnan(low) else f"has pixels at {low:g} to {high:g} m"
         warn(f"{name} {known}: positions are {fields['grid']['height']:g} m above the ellipsoid")
     return made_of(make, "image", fields, name)
@@ -199,7 +204,7 @@ def _fields(file: rasterio.DatasetReader) -> dict[str, Any]:
     kind = np.dtype(file.dtypes[0]).kind if file.dtypes[0] != "complex_int16" else "c"
     if file.crs is None:
         raise Refused("is no map: it has no coordinate reference system; have it geocoded to one")
-    if (file.count > 1 and value not in POWER) or (value or "complex") not in (*POWER, "complex"):
+    if (file.count > 1 and not value) or (value or "complex") not in (*POWER, "complex"):
         raise Refused(f"has {file.count} bands, wanted one of complex pixels, or a map that sarcl wrote")
     if not value and kind != "c":
         raise Refused(
@@ -227,10 +232,11 @@ def _fields(file: rasterio.DatasetReader) -> dict[str, Any]:
     numbers = {name: _numbers(tags, name.upper(), n) for name, n in NUMBERS.items()} if value else {}
     frequency = _numbers(tags, "FREQUENCY", 1) if value else None
     words = {name: tags.get(name.upper()) for name in ("window", "polarization")} if value else {}
-    crs, height = file.crs.to_wkt(), 0.0 if np.isnan(heights[0]) else float(heights.mean())
+    by_pixel = _heights_by_pixel(file) if value else None
+    height = by_pixel if by_pixel is not None else 0.0 if np.isnan(heights[0]) else float(heights.mean())
     return {
         "data": np.where(has_data, pixels, 0),
-        "grid": {"shape": file.shape, "crs": crs, "map_axes": axes, "height": height},
+        "grid": {"shape": file.shape, "crs": file.crs.to_wkt(), "map_axes": axes, "height": height},
         "gain": 1.0 if has_data.all() else has_data.astype(np.float32),
         "frame": "earth-fixed",
         "heights": tuple(heights.tolist()),
@@ -238,6 +244,24 @@ def _fields(file: rasterio.DatasetReader) -> dict[str, Any]:
         **numbers,
         **words,
     }
+
+
+def split_heights(heights: np.ndarray) -> list[np.ndarray]:
+    """Bands of heights (rows, columns), m, in the order of HEIGHTS."""
+    heights = np.round(heights, DIGITS)
+    coarse = heights.astype(np.float32).astype(np.float64)
+    return [coarse, heights - coarse]
+
+
+def _heights_by_pixel(file: rasterio.DatasetReader) -> np.ndarray | None:
+    """Heights (rows, columns), m, of the bands HEIGHTS, south first; NaN where there is no position, None without."""
+    if not set(HEIGHTS) <= set(file.descriptions):
+        return None
+    bands = (file.read(1 + file.descriptions.index(name))[::-1] for name in HEIGHTS)
+    heights = sum(np.asarray(band.real, np.float64) for band in bands)
+    if np.isinf(heights).any():
+        raise Refused("has heights that are infinite: it is damaged")
+    return np.round(heights, DIGITS)
 
 
 def _numbers(tags: Mapping[str, str], name: str, n: int) -> np.ndarray | None:

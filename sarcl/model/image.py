@@ -327,7 +327,8 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
         `sarcl.read` opens them all but pictures. Zarr and NetCDF are the dataset of `to_xarray`, made in memory
         (sarcl[xarray]). A map is a GeoTIFF with overviews, cloud-optimised (sarcl[maps]), of an Earth-fixed image. On a
         grid by `ImageGrid.on_map` pixels are written as they are; those of other grids are resampled block by block.
-        Values are over the gain: a unit point has modulus 1. NaN means no data.
+        Values are over the gain: a unit point has modulus 1. NaN means no data. Where heights of pixels differ, two
+        bands hold them: "height" and "height remainder", m above the ellipsoid.
 
         value    "complex" (the default): band-limited interpolation about the carrier at the centre frequency;
                  "amplitude", or "db" of it: power averaged over each pixel of the map

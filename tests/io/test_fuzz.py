@@ -123,7 +123,7 @@ def sicd_file(path):
 
 def map_file(path):
     pytest.importorskip("rasterio", reason="no rasterio: pip install sarcl[maps]")
-    grid = sarcl.ImageGrid.on_map("EPSG:32633", bounds=(291000, 4641000, 291010, 4641012), spacing=2.0, heights=90.0)
+    grid = sarcl.ImageGrid.on_map("EPSG:32633", bounds=(291000, 4641000, 291010, 4641012), spacing=2.0, heights=HILL)
     data = np.exp(1j * np.arange(np.prod(grid.shape))).reshape(grid.shape).astype(np.complex64)
     sarcl.Image(data, grid, gain=2.0, time=[0.0, 1.0], frequency=9.6e9).save(path)
 
@@ -172,6 +172,7 @@ PRODUCT = {
     "ReleaseInfo": "UNRESTRICTED", "CollectionStart": "2026-01-02T03:04:05.250000",
 }  # fmt: skip
 CRSD = {"TxRefRadIntensity": 1e6, "TxRadIntErrorStdDev": 0.1, "TxRefLAtm": 0.2, "RcvRefIrradiance": 1e-9}
+HILL = 90 + np.arange(30.0).reshape(6, 5)  # m
 CRSD |= {"RcvIrradianceErrorStdDev": 0.1, "RcvRefLAtm": 0.2, "PNCRSD": 1e-3, "BNCRSD": 0.9}
 VIRTUAL = """\
 <VRTDataset rasterXSize="5" rasterYSize="6"><SRS>EPSG:4326</SRS>

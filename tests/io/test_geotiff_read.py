@@ -63,12 +63,58 @@ def test_pixels_without_data_have_no_gain(tmp_path):
     assert (back.data[gain == 0] == 0).all()
 
 
-def test_heights_that_differ_are_told(tmp_path):
+@pytest.mark.parametrize("value", ["complex", "db"])
+def test_heights_of_pixels_return(tmp_path, value):
+    """Those of whole centimetres to the bit, others to 5 nm, which further copies keep to the bit."""
+    shape = example().shape
+    for heights, error in ((np.round(RNG.uniform(100, 3000, shape), 2), 0.0), (RNG.uniform(100, 3000, shape), 1e-8)):
+        heights[3, 5] = np.nan
+        image = example(heights=heights, dtype=np.complex128 if error else np.complex64)
+        image.save(tmp_path / "x.tif", value=value)
+        back = sarcl.read(tmp_path / "x.tif")
+        np.testing.assert_allclose(back.grid.positions, image.grid.positions, rtol=0, atol=error)
+        back.save(tmp_path / "y.tif", value=value)
+        again = sarcl.read(tmp_path / "y.tif")
+        np.testing.assert_array_equal(again.grid.positions, back.grid.positions)
+        with rasterio.open(tmp_path / "x.tif") as file:
+            assert file.descriptions == (value, "height", "height remainder") and file.units[1:] == ("m", "m")
+            np.testing.assert_allclose(file.read(2).real[::-1], heights, atol=2e-4)
+
+
+def test_a_hill_of_one_pixel_between_others_is_kept(tmp_path):
+    heights = np.full(example().shape, 100.0)
+    heights[77, 101] = 130.0
+    image = example(heights=heights)
+    image.save(tmp_path / "x.tif")
+    np.testing.assert_array_equal(sarcl.read(tmp_path / "x.tif").grid.positions, image.grid.positions)
+
+
+def test_heights_of_a_resampled_image_are_those_between_its_pixels(tmp_path):
+    """A slope on a grid turned against the map: heights rise with the distance."""
+    corner = sarcl.wgs84.ecef(12.49, 41.9, 100.0)
+    east, north, up = sarcl.wgs84.local_axes(12.49, 41.9)
+    along, across = np.cos(0.3) * east + np.sin(0.3) * north, np.cos(0.3) * north - np.sin(0.3) * east
+    i, j = np.mgrid[:60, :80][..., None] * 2.0
+    positions = corner + i * across + j * along + 0.2 * j * up
+    image = sarcl.Image(
+        np.ones((60, 80), np.complex64), sarcl.ImageGrid.points(positions), frequency=1e6, tx=2 * corner
+    )
+    image.save(tmp_path / "x.tif", value="amplitude", crs=UTM)
+    places = sarcl.read(tmp_path / "x.tif").grid.positions
+    places = places[np.isfinite(places[..., 0])] - corner
+    assert len(places) > 3000
+    np.testing.assert_allclose(places @ up, 0.2 * places @ along, atol=2e-3)
+
+
+def test_heights_whose_bands_another_program_removed_are_told(tmp_path):
     shape = example().shape
     image = example(heights=np.linspace(100.0, 150.0, shape[0])[:, None] + np.zeros(shape))
     image.save(tmp_path / "x.tif")
+    with rasterio.open(tmp_path / "x.tif") as file:
+        pixels = file.read([1])
+    changed(tmp_path / "x.tif", tmp_path / "y.tif", pixels=pixels, count=1)
     with pytest.warns(sarcl.SarclWarning, match="has pixels at 100 to 150 m: positions are 125 m above"):
-        back = sarcl.read(tmp_path / "x.tif")
+        back = sarcl.read(tmp_path / "y.tif")
     np.testing.assert_allclose(sarcl.wgs84.geodetic(back.grid.positions)[2], 125.0, atol=1e-6)
 
 

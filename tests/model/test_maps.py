@@ -285,7 +285,7 @@ def test_layers_are_those_of_the_pixels(tmp_path, image):
     assert abs(layers["incidence"][80, 80] - angle) < 1e-3 and not layers["shadow"].any()
     image.save(tmp_path / "x.tif", value="db", layers=MODEL)
     with rasterio.open(tmp_path / "x.tif") as file:
-        assert file.descriptions == ("db", "layover", "shadow", "incidence")
+        assert file.descriptions == ("db", "layover", "shadow", "incidence", "height", "height remainder")
         assert np.allclose(file.read(4)[::-1], layers["incidence"], atol=1e-6)
 
 

@@ -12,15 +12,17 @@ All values are over the gain: a unit point has modulus 1.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...base import wgs84
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.vectors import Floats
-from ._source import Source
+from ._source import Part, Source
 from .antennas import antennas_of
 
 if TYPE_CHECKING:
@@ -56,19 +58,35 @@ class Resampling:
 
     def values(self, rows: range) -> np.ndarray:
         """Complex values or amplitudes of rows of the map (n, columns), NaN where there are none."""
-        k = self.places
+        kind = np.result_type(self.image.dtype, np.complex64) if self.is_complex else np.dtype(np.float64)
+        return self._joined(rows, self.places, kind, lambda part, index: self._interpolated(index))
+
+    def heights(self, rows: range) -> Floats:
+        """Heights of the image above the ellipsoid, m, at the pixels of rows of the map (n, columns), NaN beside it."""
+        return self._joined(rows, 1, np.dtype(np.float64), _heights_at)
+
+    def _joined(
+        self, rows: range, k: int, kind: np.dtype, function: Callable[[Part, Floats], np.ndarray]
+    ) -> np.ndarray:
+        """Values of rows (n, columns), by blocks: function(part, index) gives them at indices (2, n) of the image."""
         size = max(BLOCK // k, 1)
-        kind = np.result_type(self.image.dtype, np.complex64) if self.is_complex else np.float64
         out = np.full((len(rows), self.axes.shape[1]), np.nan, kind)
         for i in range(0, len(rows), size):
             for j in range(0, out.shape[1], size):
                 shape = min(size, len(rows) - i), min(size, out.shape[1] - j)
-                values = self._block(rows[i], j, shape, k)
+                values = self._block(rows[i], j, shape, k, function)
                 if values is not None:
                     out[i : i + size, j : j + size] = values
         return out
 
-    def _block(self, row: int, column: int, shape: tuple[int, int], k: int) -> np.ndarray | None:
+    def _block(
+        self,
+        row: int,
+        column: int,
+        shape: tuple[int, int],
+        k: int,
+        function: Callable[[Part, Floats], np.ndarray],
+    ) -> np.ndarray | None:
         """Values (shape) of the block at a pixel of the map; None where the image does not lie there."""
         i, j = (first - 0.5 + (np.arange(n * k) + 0.5) / k for first, n in zip((row, column), shape, strict=True))
         x, y = (v.ravel() for v in self.axes.at(i[:, None], j))
@@ -79,8 +97,9 @@ class Resampling:
         full = np.isfinite(index[0])
         if not full.any():
             return None
-        values = np.full(len(x), np.nan, np.complex128 if self.is_complex else np.float64)
-        values[full] = self._interpolated(index[:, full])
+        inner = function(part, index[:, full])
+        values = np.full(len(x), np.nan, inner.dtype)
+        values[full] = inner
         if k == 1:
             return values.reshape(shape)
         power = values.reshape(shape[0], k, shape[1], k) ** 2
@@ -197,6 +216,13 @@ class Resampling:
         power = np.abs(np.fft.fft2(self._baseband(low, high, self._carrier(low, high)))) ** 2
         fi, fj = (np.fft.fftfreq(n) for n in power.shape)
         return fi[:, None], fj[None, :], power
+
+
+def _heights_at(part: Part, index: Floats) -> Floats:
+    """Heights above the ellipsoid, m (n,), at fractional indices (2, n) of the image: lines between pixels, and on."""
+    heights, inner = wgs84.geodetic(part.positions)[2], index - np.array([[part.rows.start], [part.columns.start]])
+    edge = np.clip(inner, 0, np.array(heights.shape)[:, None] - 1)
+    return 2 * bilinear(heights, edge) - bilinear(heights, 2 * edge - inner)
 
 
 @dataclass(frozen=True, eq=False)

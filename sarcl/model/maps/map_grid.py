@@ -113,8 +113,11 @@ def on_map(
     return projection.text, np.array(axes[:4]), wgs84.ecef(longitude, latitude, heights)
 
 
-def placed(crs: str, map_axes: np.ndarray, shape: tuple[int, int], height: float) -> tuple[str, Floats]:
-    """The CRS as text, and Earth-fixed positions, m (rows, columns, 3), of the pixels of a map at one height, m."""
+def placed(crs: str, map_axes: np.ndarray, shape: tuple[int, int], height: float | Floats) -> tuple[str, Floats]:
+    """The CRS as text, and Earth-fixed positions, m (rows, columns, 3), of the pixels of a map.
+
+    height  above the ellipsoid, m: of all, or of each pixel (rows, columns), NaN where there is none
+    """
     projection = MapProjection.of(crs)
     validation.room(f"positions of {shape[0]} x {shape[1]} pixels", 24.0 * shape[0] * shape[1], "read a smaller map")
     west, south, dx, dy = map_axes.tolist()

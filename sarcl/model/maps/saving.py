@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Literal, TypedDict
 
 import numpy as np
@@ -152,15 +153,19 @@ class _MapPicture:
     def header(self) -> geotiff.MapImage:
         """Description of the file."""
         west, _, _, north = self.axes.bounds
-        is_layered = self.elevation is not None
+        bands, kinds = [self.value], [self.value]
+        if self.elevation is not None:
+            bands, kinds = [*bands, *LAYERS], [*kinds, *("mask",) * len(LAYERS)]
+        if self.has_heights:
+            bands, kinds = [*bands, *geotiff.HEIGHTS], [*kinds, *("height",) * len(geotiff.HEIGHTS)]
         return geotiff.MapImage(
             shape=self.axes.shape,
             corner=(west, north),
             step=(self.axes.dx, self.axes.dy),
             crs=self.projection.crs.to_wkt(),
             dtype=np.result_type(self.image.dtype, np.complex64) if self.value == "complex" else np.dtype(np.float32),
-            bands=(self.value, *LAYERS) if is_layered else (self.value,),
-            kinds=(self.value, "mask", "mask", "mask") if is_layered else (self.value,),
+            bands=tuple(bands),
+            kinds=tuple(kinds),
             tags=self._tags(),
         )
 
@@ -170,10 +175,7 @@ class _MapPicture:
             "SOFTWARE": f"sarcl {__version__}",
             "VALUE": f"{self.value} over gain: a unit point has modulus 1; its square is a radar cross section, m^2",
         }
-        ends = (np.unique(np.linspace(0, n - 1, NODES).astype(int)) for n in image.shape)
-        nodes = image.grid.positions_of(tuple(np.meshgrid(*ends, indexing="ij"))).reshape(-1, 3)
-        heights = np.round(wgs84.geodetic(nodes[np.isfinite(nodes[:, 0])])[2], HEIGHT_DIGITS)
-        numbers = {"AXES": self.axes[:4], "HEIGHTS": (heights.min(), heights.max())}
+        numbers = {"AXES": self.axes[:4], "HEIGHTS": self.heights}
         tags |= {name: " ".join(repr(float(v)) for v in values) for name, values in numbers.items()}
         names = ("frequency", "band", "time", "tx", "rx", "tx_velocity", "rx_velocity", "window", "polarization")
         for name in names:
@@ -181,6 +183,30 @@ class _MapPicture:
             if field is not None:
                 tags[name.upper()] = " ".join(map(str, np.atleast_1d(field).tolist()))
         return tags
+
+    @cached_property
+    def heights(self) -> tuple[float, float]:
+        """Least and largest height above the ellipsoid, m, of a lattice of the image's pixels."""
+        ends = (np.unique(np.linspace(0, n - 1, NODES).astype(int)) for n in self.image.shape)
+        nodes = self.image.grid.positions_of(tuple(np.meshgrid(*ends, indexing="ij"))).reshape(-1, 3)
+        heights = np.round(wgs84.geodetic(nodes[np.isfinite(nodes[:, 0])])[2], HEIGHT_DIGITS)
+        return float(heights.min()), float(heights.max())
+
+    @cached_property
+    def has_heights(self) -> bool:
+        """Whether the file needs a height for each pixel: heights differ, or resampled ones by more than LEVEL."""
+        low, high = self.heights
+        if self.resampling is not None or self.image.grid.listed is None:
+            return high - low > geotiff.LEVEL
+        if high > low:
+            return True
+        # the ellipsoid with longer half axes stays within 4 cm of the surface at a height below 10 km
+        radius, pole = wgs84.SEMI_MAJOR + low, wgs84.SEMI_MAJOR * (1 - wgs84.FLATTENING) + low
+        spread = [np.inf, -np.inf]
+        for row in self.image.grid.listed:  # a hill may lie between the lattice's pixels
+            distance = radius * (np.linalg.norm(row / [radius, radius, pole], axis=1) - 1)
+            spread = [np.fmin(spread[0], np.fmin.reduce(distance)), np.fmax(spread[1], np.fmax.reduce(distance))]
+        return bool(spread[1] - spread[0] > geotiff.LEVEL)
 
     def blocks(self) -> Iterator[np.ndarray]:
         """Blocks of rows of all bands, from north to south."""
@@ -193,6 +219,8 @@ class _MapPicture:
             bands = [values]
             if self.elevation is not None:
                 bands += self._layer_bands(rows)
+            if self.has_heights:
+                bands += geotiff.split_heights(self._heights_of(rows))
             yield np.stack(bands)[:, ::-1].astype(self.header().dtype)
 
     def _values(self, rows: range) -> np.ndarray:
@@ -210,6 +238,13 @@ class _MapPicture:
         if self.value == "complex":
             return values
         return np.abs(values) if self.image.is_complex else np.sqrt(values)
+
+    def _heights_of(self, rows: range) -> Floats:
+        """Heights above the ellipsoid, m (n, columns), NaN where there is no position."""
+        if self.resampling is not None:
+            return self.resampling.heights(rows)
+        index = np.meshgrid(np.arange(rows.start, rows.stop), np.arange(self.axes.shape[1]), indexing="ij")
+        return wgs84.geodetic(self.image.grid.positions_of(tuple(index)))[2]
 
     def _layer_bands(self, rows: range) -> list[np.ndarray]:
         assert self.elevation is not None
