@@ -191,6 +191,14 @@ def _check(pvp: np.ndarray, ppp: np.ndarray, vectors: np.ndarray, channel: Chann
             raise Refused(
                 f"has {name} = {ppp[name].min():g} to {ppp[name].max():g} in channel {channel.name!r}, wanted one"
             )
+    middle = (ppp["FX1"] + ppp["FX2"]) / 2
+    is_off = ~(np.abs(ppp["FxFreq0"] - middle) <= np.abs(ppp["FxRate"]) * ppp["TXmt"] / 4)  # a quarter of the sweep
+    if is_off.any():
+        i = int(np.argmax(is_off))
+        raise Refused(
+            f"has FxFreq0 = {ppp['FxFreq0'][i]:.6g} Hz in channel {channel.name!r}, wanted {middle[i]:.6g} Hz, the "
+            "middle of FX1 and FX2: FxFreq0 is the frequency at TxTime, the middle of the pulse; have it written so"
+        )
     if not (pvp["FRCV1"] < pvp["FRCV2"]).all():
         raise Refused(f"has FRCV2 not above FRCV1 in channel {channel.name!r}: it is damaged")
 
