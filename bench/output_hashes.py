@@ -555,6 +555,7 @@ table(focus, of_image, {
     "direct float64 bistatic": {"tolerance": 1e-9, "raw": lambda: white(bistatic=True), "grid": lambda: plane(40)},
     "direct float64 points": {"tolerance": 1e-8, "grid": lambda: sarcl.ImageGrid.points(bumps()), "wrap": True},
     "direct float64 beam": {"tolerance": 1e-8, "grid": lambda: plane(40), "beam": 0.0015},
+    "direct float64 antenna": {"tolerance": 1e-8, "grid": lambda: plane(40), "beam": gaussian},
     "direct complex128": {"raw": lambda: white(dtype=np.complex128)},
     "direct bistatic": {"raw": lambda: white(bistatic=True)},
     "direct bistatic 1e-5": {"raw": lambda: white(bistatic=True), "tolerance": 1e-5},

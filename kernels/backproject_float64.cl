@@ -5,7 +5,7 @@
 // source    the image equation of sarcl/__init__.py
 // symbols   delta, kappa as in point_path_float64.clh;  s~_p  range profile between its samples
 // macros    VW, WRAP, TAPS, TERMS, BISTATIC, BEAM, ORDER as in the headers
-//           WEIGHT    0, 1 or 2: see pixel_weights.clh;  GAINS, ALIKE as in gains_float64.clh, where it is 2
+//           WEIGHT    0 to 3: see pixel_weights.clh;  GAINS, ALIKE as in gains_float64.clh, where it is 2 or 3
 //           GRADIENT  1: the gradient of <y, A x> by positions over amplitudes, conjugate: three images of y times j 2 pi kappa,
 //                     weighted by minus the mean of the unit vectors to T and R, and of y times the gradient of the gains
 //           CHUNK     pulses added plainly before they join the compensated total
@@ -35,7 +35,7 @@ typedef struct {
 //   positions   (3, pixels)           m; one tile after another
 //   image       (CHANNELS, 4, pixels) totals re, im and their errors re, im
 //   place       (n_used), taper (TAPER), aperture (2, pixels): start and inverse; not read where WEIGHT is 0. Where it is 2
-//               taper has the patterns, and aperture the axes (n_used, 18)
+//               or 3 taper has the patterns, and aperture the axes (n_used, 18); where it is 3 place has the weights of rows
 //   skipped     (2, n_tiles)          pulses in whose window no point of the tile lies, and those in whose beam none does
 //   plain       as profiles, which are those of y times j 2 pi kappa: of y itself. Read where there are gains and GRADIENT
 __kernel void backproject(backproject_numbers given, __global const double *restrict profiles,
@@ -65,6 +65,12 @@ __kernel void backproject(backproject_numbers given, __global const double *rest
                 continue;
             }
             point_path at = path_of(record, pulse, n, p, state, x, q, qq);
+            pattern_value sent, received;
+            if (SUMS_GAINS) {
+                gains_of(at, taper, aperture + 18 * (size_t)p, &sent, &received);
+                re[0] = fma(place[p] * at.inside, fma(sent.re, sent.re, sent.im * sent.im), re[0]);
+                continue;
+            }
             dv w[TAPS], g, h, sine, cosine;
             lv j;
             tap_weights(first_tap(at.t, at.base, stride, origin, &j), table, w);
@@ -80,7 +86,6 @@ __kernel void backproject(backproject_numbers given, __global const double *rest
                 h *= weight;
             }
             dv a = fma(g, cosine, -h * sine), b = fma(g, sine, h * cosine);
-            pattern_value sent, received;
             if (MATCHED) {
                 gains_of(at, taper, aperture + 18 * (size_t)p, &sent, &received);
                 dv real = a;

@@ -96,9 +96,10 @@ def _axes(
     return antenna.axes(pointing.fixed(track, attitude, up=up))
 
 
-def rounding(task: FocusingTask, radius: float) -> float:
+def rounding(task: FocusingTask, radius: float, share: float = 1.0) -> float:
     """Relative error of the image from gains in float32. ValueError where the grid lies out of the beam.
 
+    share    of rounding in other numbers, of that in float32
     radius   of the largest tiles, m, padding included. Directions are differences of positions about a tile's middle:
              where a tile reaches farther than to the antenna, they are rounded by as much more
     """
@@ -117,7 +118,7 @@ def rounding(task: FocusingTask, radius: float) -> float:
     reach = radius / np.maximum(distances, max(LEAST_DISTANCE * radius, np.finfo(float).tiny))
     angle = ANGLE * float(np.sqrt(np.mean((1 + 2 * reach) ** 2)))
     one_way = sum(PATTERN + angle * one.slope(beam.frequency) for one in beam.patterns)
-    return float(one_way * beam.peak / np.sqrt(power))
+    return share * float(one_way * beam.peak / np.sqrt(power))
 
 
 def shares(task: FocusingTask, points: np.ndarray) -> np.ndarray:
@@ -129,23 +130,28 @@ def shares(task: FocusingTask, points: np.ndarray) -> np.ndarray:
 
 
 class GainsFloat64:
-    """Buffers of an antenna for the kernels in float64, in the places of those of `TaperOnDevice`."""
+    """Buffers of an antenna for the kernels in float64, in the places of those of `TaperOnDevice`.
+
+    gain  True: they add up |g|^2 times the rows' weights, not the echoes
+    """
 
     pixel_bytes = 0
 
-    def __init__(self, device: Device, task: FocusingTask) -> None:
+    def __init__(self, device: Device, task: FocusingTask, gain: bool = False) -> None:
         assert task.antenna is not None
         self.device, self.beam, macros = device, task.antenna, task.antenna.macros(1)
         self.patterns, _ = self.beam.upload(device, np.float64)
-        self.macros = {"WEIGHT": 2, "GAINS": macros["GAINS"], "ALIKE": macros["ALIKE"]}
+        self.macros = {"WEIGHT": 3 if gain else 2, "GAINS": macros["GAINS"], "ALIKE": macros["ALIKE"]}
+        self._weights = np.asarray(task.row_weight, np.float64) if gain else None
 
     def apertures(self, positions: np.ndarray) -> None:
         """None: gains have no numbers per pixel."""
 
     def arguments(self, apertures: Buffer | None, start: int, stop: int) -> tuple[Buffer | None, ...]:
-        """The kernel's arguments of rows start ... stop - 1: patterns twice, and axes."""
+        """The kernel's arguments of rows start ... stop - 1: weights (or, not read, patterns), patterns, axes."""
         axes = self.beam.packed_axes(np.arange(start, stop), np.float64)
-        return self.patterns, self.patterns, self.device.upload(axes)
+        weights = self.patterns if self._weights is None else self.device.upload(self._weights[start:stop])
+        return weights, self.patterns, self.device.upload(axes)
 
 
 class AntennaOnDevice:

@@ -248,14 +248,16 @@ class BackprojectPlan:
 def _antenna_gain(
     task: FocusingTask, chosen: MethodChoice, device: Device, options: BackprojectOptions
 ) -> float | np.ndarray | None:
-    """Sums of the squared gains of the antenna times the weights, float32 of the grid's shape; a number where they are
-    the same in all pixels; None where they are 0 in all: the antenna sees no pixel inside a range window."""
+    """Sums of the squared gains of the antenna times the weights, of the grid's shape, float32, or float64 of an image
+    in complex128; a number where they are the same in all pixels; None where they are 0 in all: the antenna sees no
+    pixel inside a range window."""
     engine: Any = chosen.engine
     tiling, budget = chosen.tiling, options.budget(device)
     sums = engine(device, task, chosen.plan, tiling, gain=True)
-    flat = np.zeros(task.grid.shape if tiling.in_rows else task.grid.size, np.float32)
+    kind: type[np.floating] = np.float64 if chosen.dtype == np.complex128 else np.float32
+    flat = np.zeros(task.grid.shape if tiling.in_rows else task.grid.size, kind)
     for first, last in sums.blocks(budget):
-        bands = BandBuffer(tiling, first, last, np.complex64)
+        bands = BandBuffer(tiling, first, last, chosen.dtype)
         sums.fill(first, last, bands, budget, Clock(), lambda rows: None)
         flat[tiling.extent(first, last)] = bands.values.real
     flat *= task.sample_weight.sum()

@@ -33,6 +33,7 @@ from .tiling.tiling import Tiling
 METHODS = ("auto", "direct", "factorized")
 ROUNDING = 0.5  # largest share of a tolerance for each error that no plan makes smaller; the plan needs the rest
 STEP_OF_SEARCH = 2.0  # ratio of the tolerances that are tried for a refusal: plans of sub-apertures take long
+FLOAT64_SHARE = 1e-8  # error of gains in float64, over that in float32: 2^-29 by the digits, and a margin
 GAINS, SUMS = "float32 gains of the antenna", "rounding of float32 sums"
 COORDINATES, NEAR_ORIGIN = "float64 coordinates of a plane's pixels", "put the origin near the scene"
 
@@ -231,17 +232,14 @@ def _direct(task: FocusingTask, tolerance: float, devices: DeviceClass, float64:
         remedy = _without_float64(task, float64)
         if remedy:
             return candidate if candidate.remedy else candidate.restated(tolerance, None, remedy)
-    elif task.antenna is not None or not float64:
+    elif not float64:
         best = reachable(lambda t: _confirmed(Float32Methods(task, t).direct(devices)), LEAST_TOLERANCE)
-        limit, how = (GAINS, "with an antenna") if task.antenna is not None else ("float32", "without float64")
-        return ToleranceUnreachable(tolerance, best, limit, _without_float64(task, float64), how)
+        return ToleranceUnreachable(tolerance, best, "float32", _without_float64(task, float64), "without float64")
     return in_float64(task, tolerance)
 
 
 def _without_float64(task: FocusingTask, float64: bool) -> str:
     """Remedy where complex64 cannot meet a tolerance and no sums in complex128 can be made; "": they can."""
-    if task.antenna is not None:
-        return "give the beam an angle"
     if not float64:
         return float64_direct.remedy()
     return float64_plan.too_long(task) or ""
@@ -268,10 +266,16 @@ def _factorized(task: FocusingTask, tolerance: float, devices: DeviceClass, floa
 
 def in_float64(task: FocusingTask, tolerance: float) -> Candidate:
     """The direct method in float64."""
+    errors = {}
+    if task.antenna is not None:
+        radius = tiling_of(task.grid, max(float64_plan.SIDES)).radius
+        errors["float64 gains of the antenna"] = antenna_beam.rounding(task, radius, FLOAT64_SHARE)
+    gains = sum(errors.values())
     try:
-        plan, tiling = float64_plan.make_plan(task, tolerance)
+        plan, tiling = float64_plan.make_plan(task, tolerance - gains)
     except ToleranceUnreachable as refusal:
-        return refusal
-    terms = terms_of_sum({"float64 range profiles": float(plan.predicted_error)})
-    cost = cost_model.FLOAT64_UNIT * plan.cost / task.grid.size
-    return MethodChoice("direct", plan, tiling, float64_direct.DirectFloat64, plan.predicted_error, terms, cost)
+        best = refusal.best and askable(rounded_up(refusal.best + gains))
+        return refusal if not gains else refusal.restated(tolerance, best)
+    terms = terms_of_sum({"float64 range profiles": float(plan.predicted_error), **errors})
+    cost, error = cost_model.FLOAT64_UNIT * plan.cost / task.grid.size, plan.predicted_error + gains
+    return MethodChoice("direct", plan, tiling, float64_direct.DirectFloat64, error, terms, cost)

@@ -35,14 +35,17 @@ class DirectFloat64(DirectEngine):
     dtype = np.complex128
     least = np.inf
 
-    def __init__(self, device: Device, task: FocusingTask, plan: Float64Plan, tiling: Tiling) -> None:
+    def __init__(
+        self, device: Device, task: FocusingTask, plan: Float64Plan, tiling: Tiling, gain: bool = False
+    ) -> None:
+        """gain  True: it makes sums of squared gains of the antenna and the rows' weights, instead of an image."""
         if not device.info.fp64:
             raise ValueError(_no_float64(device))
         self.device, self.task, self.plan, self.tiling = device, task, plan, tiling
         self.lanes = device.info.vector_width
         geometry = {"BISTATIC": int(not task.antennas.is_monostatic), "BEAM": int(task.antennas.beam is not None)}
         self.constants = device.kernel("tile_constants_float64.cl", "tile_constants", **geometry)
-        self.taper = weights_on(device, task)
+        self.taper = weights_on(device, task, gain)
         macros = {**geometry, **plan.macros(task.wrap), **self.taper.macros}
         self.kernel = device.kernel("backproject_float64.cl", "backproject", **macros)
         self.group = device.max_group(self.kernel)
@@ -136,9 +139,9 @@ class DirectFloat64(DirectEngine):
         return values, device.download(missed, np.empty((2, n_tiles), np.int32)).astype(np.int64)
 
 
-def weights_on(device: Device, task: FocusingTask) -> GainsFloat64 | TaperOnDevice:
+def weights_on(device: Device, task: FocusingTask, gain: bool = False) -> GainsFloat64 | TaperOnDevice:
     """Buffers of the weights that rows have in each pixel: gains of an antenna, a taper, or none."""
-    return TaperOnDevice(device, task, np.float64) if task.antenna is None else GainsFloat64(device, task)
+    return TaperOnDevice(device, task, np.float64) if task.antenna is None else GainsFloat64(device, task, gain)
 
 
 def _no_float64(device: Device) -> str:
