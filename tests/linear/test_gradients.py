@@ -63,6 +63,7 @@ def test_gradients_of_random_tasks():
         like = noise_history(n_rows=n_rows, n_samples=n, distance=distance, bistatic=bistatic, seed=seed)
         x, y = random_vector(GRID.size, seed), random_vector(n_rows * n, seed + 9)
         expected = closed_form(like, 1.0, x, y.reshape(n_rows, n))
+        del expected["pointing"]  # without an antenna there is none
         for i, options in enumerate(({"tolerance": 1e-5}, {"exact": True, "tolerance": 1e-9})):
             got = sarcl.linear.Echoes(GRID, like, **options).gradients(x, y, of=[*expected])
             error = max(np.linalg.norm(got[k] - expected[k]) / np.linalg.norm(expected[k]) for k in expected)
