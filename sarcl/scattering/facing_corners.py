@@ -193,8 +193,12 @@ def _corner(a: _Part, b: _Part, least: float) -> _Corner | None:
 
 
 def _parts(scene: Scene, wavelength: float) -> list[_Part]:
-    """Facets with a coherent part, joined where they lie in one plane: the largest parts."""
-    facet = np.flatnonzero(coherent(scene) & (scene.reflectivity > 0))
+    """Facets with a coherent part, joined where they lie in one plane: the largest parts.
+
+    Without those of scattering models of installed packages: Fresnel's coefficients do not say what they reflect.
+    """
+    fresnel_facets = np.array([not material.scattering for material in scene.materials], bool)[scene.material]
+    facet = np.flatnonzero(coherent(scene) & fresnel_facets & (scene.reflectivity > 0))
     triangles = scene.triangles[facet]
     normals, areas = normals_and_areas(triangles)
     has_area = areas > 0

@@ -35,9 +35,10 @@ def warn_of_coincident(scene: Scene) -> None:
     twice = np.flatnonzero((distance < EQUAL * size) & faces & sides[0].any(axis=1))
     if len(twice):
         first = sorted((int(facet[order[near[twice[0]]]]), int(facet[order[near[twice[0]] + 1]])))
+        number = "1 facet lies on another" if len(twice) == 1 else f"{len(twice)} facets lie on others"
         warn(
-            f"{len(twice)} facets lie on others, such as facet {first[1]} on facet {first[0]}: each of them counts, so "
-            "that their echo is twice as strong; leave them out (was a scene added to itself?)",
+            f"{number}, such as facet {first[1]} on facet {first[0]}: each of them counts, so that their echo is twice "
+            "as strong; leave them out (was a scene added to itself?)",
             "coincident facets",
         )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -282,6 +283,18 @@ def test_the_conductor_as_a_model_is_the_conductor(install):
     )
     assert np.linalg.norm(metal.samples - mixed.samples) <= 2e-3 * np.linalg.norm(metal.samples)
     assert mixed.report.plan["sums"] == "in float64"
+
+
+def test_corners_of_a_model_are_not_judged_by_the_coefficients_of_others(install):
+    install("wave_pkg", SCATTERING, scattering=MODELS)
+    words = []
+    for material in (sarcl.Material(), sarcl.Material(scattering="lambertian")):
+        corner = sarcl.shapes.dihedral((0.5, 0.5), material=material)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error" if material.scattering else "ignore", sarcl.SarclWarning)
+            above = sarcl.Trajectory(None, [[7e3, 0, 7e3]])
+            words.append(sarcl.plan(sarcl.echo, corner, CHIRP, above, tolerance=0.1).plan)
+    assert ["left out at right angles, dB" in plan for plan in words] == [True, False]
 
 
 def test_a_model_follows_direction_and_frequency(install):

@@ -29,6 +29,12 @@ def test_facets_that_lie_on_others_are_counted_with_the_remedy(twin):
         sarcl.rcs(BOX + twin, 0.0, 0.5, 9.6e9)
 
 
+def test_one_facet_on_another_is_said_in_the_singular():
+    scene = sarcl.Scene.facets(np.concatenate([BOX.triangles, BOX.triangles[:1]]), two_sided=np.zeros(13, bool))
+    with pytest.warns(sarcl.SarclWarning, match="1 facet lies on another, such as facet 12 on facet 0:"):
+        sarcl.rcs(scene, 0.0, 0.5, 9.6e9)
+
+
 @pytest.mark.parametrize(
     "other",
     [
@@ -39,7 +45,7 @@ def test_facets_that_lie_on_others_are_counted_with_the_remedy(twin):
 )
 def test_bodies_that_touch_or_nearly_coincide_are_not_warned_of(other):
     with warnings.catch_warnings():
-        warnings.filterwarnings("error", message=".*lie on others")
+        warnings.filterwarnings("error", message=".*lies? on ")
         warnings.filterwarnings("ignore", message="flat parts face")
         echo(BOX + other)
 

@@ -70,7 +70,7 @@ def test_a_half_hidden_edge_is_the_edge_cut_at_the_end_of_its_shadow():
     assert difference(wanted, both - alone) < 2e-3  # the end of the shadow is found to 1/4096 of a piece
 
 
-@pytest.mark.filterwarnings("ignore:1 facets lie on others")
+@pytest.mark.filterwarnings("ignore:1 facet lies on another")
 def test_faults_of_meshes():
     wanted, triangles = section(BOX), BOX.triangles
     jitter = np.random.default_rng(0).uniform(-1e-8, 1e-8, triangles.shape)  # m: corners that do not coincide
