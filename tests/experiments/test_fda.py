@@ -167,6 +167,11 @@ def test_false_peaks_and_displaced_ones_are_measured():
     assert found["false_db"] > 0 and not fda.is_resolved(found, 0.1)
 
 
+def test_a_cut_without_a_position_at_a_point_is_refused_by_name():
+    with pytest.raises(ValueError, match=r"separation is 0\.1 m, and `at` has no position .* closer together"):
+        fda.pair(np.linspace(-1, 1, 11), np.ones(11), 0.1)
+
+
 def test_one_peak_has_neither_error_of_position_nor_others_beside_it():
     at = np.linspace(-1, 1, 401)
     found = fda.pair(at, np.exp(-((at / 0.3) ** 2)), 0.2)
@@ -419,6 +424,7 @@ BAD = {
     'mappings = ["apparent", "apparent"]': "each of them once",
     "name = 3": "give a text",
     "separations = [2.1]": "the cut 2 m to each side",
+    "aperture = 20.0": "separations go down to 0.1 m, but samples of the cut are 0.15 m apart",
     "[sweep]\nmirrored = [true, 3]": "mirrored 3: mirrored is 3; give true or false",
     'receive = "some"': "choose one of",
     "series = 3": "unknown key 'series'",

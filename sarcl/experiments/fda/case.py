@@ -25,6 +25,7 @@ from ._array import PROGRESSIONS, as_channels, groups_of, highest, make, size, s
 RAW = "unmodified"
 PATHS = ("line", "circle")
 REACH = 12.0  # length of a cut on each side of a point, in nulls of the conventional antenna
+STEPS = 24  # samples of a cut per null of the conventional antenna
 WIDE = 0.05  # share of the aperture; phase centres spread over less change widths by at most a thousandth
 STEEPEST = 1.55  # rad, largest squint
 
@@ -151,6 +152,12 @@ class Case:
             raise ValueError(
                 f"separations reach {max(self.separations):g} m, but the cut {reach:.3g} m to each side, {REACH:g} "
                 "nulls; give smaller ones"
+            )
+        least, step = min(self.separations), self.null / STEPS
+        if least < step:
+            raise ValueError(
+                f"separations go down to {least:g} m, but samples of the cut are {step:.3g} m apart, {STEPS} to a null "
+                f"of {self.null:.3g} m; give larger ones, or a longer aperture"
             )
         track, centers = self.track(), self.phase_centers
         ends = [_moved(track, centers[i]).positions for i in (0, -1)]

@@ -20,10 +20,9 @@ from ...base.text import shown
 from ...base.vectors import unit
 from ...model.phase_history import PhaseHistory
 from ...opencl.device import DeviceChoice
-from .case import RAW, REACH, Case
+from .case import RAW, REACH, STEPS, Case
 
 CONVENTIONAL = "conventional"
-STEPS = 24  # samples of a cut per null of the conventional antenna
 DRAWN = 2000  # spatial frequencies that are kept, for plots
 RESOLVED = 3.0  # dB: least dip between two points that are resolved, and of other peaks below the lower of the two
 ALIKE = 0.2  # dB; dips that differ by less count as equal
@@ -233,6 +232,11 @@ def pair(at: np.ndarray, values: np.ndarray, separation: float) -> Pair:
     found = []
     for side in (-1, 1):
         near = np.flatnonzero((side * at >= separation / 8) & (side * at <= separation))
+        if not len(near):
+            raise ValueError(
+                f"separation is {separation:g} m, and `at` has no position between an eighth and all of it on each "
+                "side of 0; give positions that are closer together"
+            )
         peak = int(near[values[near].argmax()])
         if peak in (near[0], near[-1]):  # no peak: the level only rises, towards the middle or outwards
             break
