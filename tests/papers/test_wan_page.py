@@ -10,7 +10,8 @@ import pytest
 from sarcl import papers
 from sarcl.cli import parser
 from sarcl.opencl.choose_device import open_device
-from sarcl.papers.lab import Lab
+from sarcl.papers.lab import SIGNIFICANT, Lab, tested
+from sarcl.papers.paper import Section
 
 DIFFERENT = {"coefficient as permittivity grows", "phase of an echo from 0.02 m farther, L band"}
 
@@ -20,6 +21,13 @@ def test_errors_in_print_are_measured():
     area, phase = errors_in_print(Lab(open_device(None), quick=True)).rows
     assert area.holds and area.value == pytest.approx(1 / np.cos(np.radians(20)), abs=1e-5)
     assert not phase.holds and phase.value == pytest.approx(-4 * np.pi * 0.02 * 1.27e9 / 299792458.0, abs=0.02)
+
+
+def test_the_test_of_phases_is_said_as_a_verdict():
+    out = Section.of("wan", "speckle")
+    for p in (0.999, 1e-4):
+        out.states("phases", p, p > SIGNIFICANT, verdict=tested(p))
+    assert [row.measured for row in out.rows] == ["not rejected: p = 1", "rejected: p = 1.0e-04"]
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ import numpy as np
 
 from ...scene.material import Material
 from ..far_radar import ground, speckle
-from ..lab import Lab, histogram, rayleigh
+from ..lab import SIGNIFICANT, Lab, histogram, rayleigh, tested
 from ..paper import Section
 from ._radar import l_band
 
@@ -39,7 +39,7 @@ def section(lab: Lab) -> Section:
     many, few = statistics
     most = FINITE + CHANCE / np.sqrt(len(pixels))
     out.states("amplitudes", many.difference, many.difference < most, most=most, finite=FINITE)
-    out.states("phases", many.uniform, many.uniform > 0.01)
+    out.states("phases", many.uniform, many.uniform > SIGNIFICANT, verdict=tested(many.uniform))
     out.keep(contrast=many.contrast, contrast_of_few=few.contrast, difference_of_few=few.difference)
     levels = curves[0][1]
     out.plot("Amplitudes of the image's resolution cells", [*curves, ("Rayleigh", levels, rayleigh(levels))])
