@@ -225,6 +225,24 @@ def test_every_module_and_kernel_is_in_the_wheel(wheel):
     assert {p for p in folders if f"{p}/__init__.py" not in wanted} == set()  # each is a package
 
 
+def test_the_description_of_the_wheel_has_no_link_that_leads_nowhere(wheel):
+    text = next(wheel.glob("*.dist-info/METADATA")).read_text()
+    assert "Description-Content-Type: text/markdown" in text and "physical optics" in text
+    urls = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"].get("urls", {})
+    assert [link for link in re.findall(r"\]\(([^)]*)\)", text) if not link.startswith(("http", "#"))] == []
+    assert ("](http" in text) or "Source" not in urls
+
+
+def test_links_of_the_description_lead_to_the_page_of_the_repository():
+    place, text = {"__file__": str(ROOT / "setup.py")}, (ROOT / "setup.py").read_text()
+    exec(text[: text.index("class SourcesAndTests")], place)  # the functions alone: nothing is built
+    page = "![a](b.png) [c `d` [e]](docs/f.md#g) [h](https://i.example) [j](#k)"
+    assert place["description"](page, None) == "c `d` [e] [h](https://i.example) [j](#k)"
+    here = "https://host.example/own/sarcl"
+    wanted = f"![a]({here}/raw/HEAD/b.png) [c `d` [e]]({here}/blob/HEAD/docs/f.md#g) [h](https://i.example) [j](#k)"
+    assert place["description"](page, here + "/") == wanted
+
+
 LOOK = """
 import json, sarcl
 from importlib.resources import files
