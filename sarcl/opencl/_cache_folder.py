@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import logging
 import os
+import shutil
 import sqlite3
 import stat
 import tempfile
@@ -41,6 +42,18 @@ def _drop_damaged() -> None:
         log.warning("%s is damaged and made anew", path)
         with suppress(OSError):
             path.unlink()
+
+
+def drop_empty_programs() -> None:
+    """Remove programs without contents from PoCL's cache, which a process leaves that ends while it builds them: PoCL
+    takes them for built, and every later process would find no kernels in them."""
+    import platformdirs
+
+    folder = Path(os.environ.get("POCL_CACHE_DIR") or Path(platformdirs.user_cache_dir(), "pocl"))
+    for path in list(folder.rglob("program.bc")):
+        with suppress(OSError):
+            if not path.stat().st_size:
+                shutil.rmtree(path.parent)
 
 
 def _writable() -> str:

@@ -10,7 +10,7 @@ from importlib import metadata
 from typing import TYPE_CHECKING, NamedTuple
 
 from ..base.text import size_text
-from . import _child, _drivers, _linker
+from . import _cache_folder, _child, _drivers, _linker
 from ._probe import LOAD, View, view
 
 if TYPE_CHECKING:
@@ -57,6 +57,7 @@ def examine(look: Look = view) -> Examination:
     crashes: dict[int, str] = {}
     while (seen := look(*crashes)).step.isdecimal():
         crashes[int(seen.step)] = seen.end  # the other devices are tried by another child
+        _cache_folder.drop_empty_programs()
     drivers = _drivers.drivers()
     findings = [*_of_packages(seen), *_of_variables(seen, look), *_of_drivers(seen, drivers, look)]
     if not (seen.devices or drivers or _faults(findings)):

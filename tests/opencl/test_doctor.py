@@ -186,6 +186,16 @@ def test_trials_that_end_their_process_leave_the_other_devices(device):
     assert "set SARCL_DEVICE=2" in the(found, "the choice of a device ends every program").remedy
 
 
+def test_a_trial_that_ends_its_process_leaves_no_empty_program_in_the_cache_of_pocl(device, tmp_path, monkeypatch):
+    monkeypatch.setenv("POCL_CACHE_DIR", str(tmp_path))
+    for name, contents in (("AB/SOUND", b"BC"), ("CD/EMPTY", b"")):
+        (tmp_path / name / "compute").mkdir(parents=True)
+        (tmp_path / name / "program.bc").write_bytes(contents)
+    first = replace(device, works=False)
+    examined(View(step="0", end="SIGABRT", devices={0: first}), seen(devices={0: first}, picked=[]))
+    assert [path.name for path in tmp_path.glob("*/*")] == ["SOUND"]
+
+
 @pytest.mark.parametrize("platform, wheel, word", [
     (POCL, "3.0", "pip uninstall pocl-binary-distribution"), (POCL, "2.0", "update its driver"),
     (POCL, "", "update its driver"), ("Other", "3.0", "update its driver"),
