@@ -111,7 +111,7 @@ INTERPOLATION_PAYS = 0.7  # share of the cost of separate channels below which i
 # Echoes of points and facets, in us, beside which the plan of a spectral echo is short (2026-11-23).
 ECHO_PULSE = 50.0  # per pulse and polarisation
 ECHO_SAMPLE = 0.03  # per sample
-ECHO_POINT, ECHO_FACET = 0.02, 0.16  # per scatterer
+ECHO_FACET = 0.16  # per facet
 
 # Forecasts of echoes, in us of one core (2026-11-26). Measured: 1e5 points and 256 pulses, the scenes of the demo (6e5
 # and 2.5e6 pieces), a terrain of 1.6e6 pieces and 8 pulses, a car of 1440 pieces and 96 pulses.

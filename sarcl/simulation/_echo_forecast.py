@@ -65,7 +65,8 @@ def forecast_of(
     plan["method"]  "spread or factorized": of many facets that are not cut yet
     plan["spectral_echo"]  about the seconds of `spectral_echo` instead, or why it refuses or was not planned
     """
-    work, shape = EchoWork.of(planned), planned.channels.shape
+    shape = planned.channels.shape
+    work = EchoWork.of(planned.scene, planned.method.runs, shape[-1])
     limits = task.request.limits
     if work.preparing <= max(limits.prepared_share * work.seconds, limits.prepared_seconds):
         planned, prepared = planned.with_scene()
@@ -206,12 +207,14 @@ def _spectral(task: EchoTask, work: EchoWork, seconds: float) -> str:
         n_points = len(task.scene.positions)
         if 1e-6 * (cost_model.SPECTRAL_PLAN + cost_model.SPECTRAL_PLAN_POINT * n_points) > longest:
             return f"not planned: that takes long beside echo, about {duration(seconds)}"
+        from .spectral._planning_time import PlanningTime
         from .spectral.spectral_parts import plan_parts  # imports scipy
 
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SarclWarning)  # those of the mesh came with the plan of echo
             clock = Clock()
-            parts = plan_parts(spectral, replace(spectral.request, clock=clock, progress=None), longest)
+            request = replace(spectral.request, clock=clock, progress=None)
+            parts = plan_parts(spectral, request, PlanningTime(len(spectral.track), lambda: seconds, longest))
     except (NotApplicable, NothingSeen, ToleranceUnreachable) as refused:
         return str(refused)
     return f"about {duration(sum(clock.seconds.values()) + parts.seconds())}"

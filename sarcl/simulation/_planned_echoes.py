@@ -112,9 +112,8 @@ class EchoWork(NamedTuple):
         return self.preparing + self.adding
 
     @classmethod
-    def of(cls, planned: PlannedEchoes) -> EchoWork:
-        """The work of a plan."""
-        scene, runs = planned.scene, planned.method.runs
+    def of(cls, scene: ScenePlan, runs: int, n_samples: int) -> EchoWork:
+        """The work of a scene's echoes;  runs  pulses of one transmitter and receiver, n_samples each."""
         request, seen = scene.request, scene.seen
         n_points = len(seen.scene.positions) if request.same else 0
         smooth, rough = scene.n_pieces()
@@ -129,7 +128,7 @@ class EchoWork(NamedTuple):
             looks = min(n_pulses, cost_model.LOOKS) if sampled and _shadows_may_fall(scene) else 0
             cutting += cost_model.CLIPPED_PIECE * clipped + cost_model.LOOK_AT_PIECE * rough * looks
             lit = cost_model.LIT_PIECE * clipped
-        n_polarizations, n_samples = len(request.polarizations), planned.channels.shape[-1]
+        n_polarizations = len(request.polarizations)
         pulse = cost_model.ECHO_PULSE + cost_model.ECHO_SAMPLE * n_samples + cost_model.SPREAD_PIECE * (smooth + rough)
         cost, by_levels = points_cost(scene) if n_points else (0.0, False)
         adding = runs * (n_polarizations * pulse + cost_model.SPREAD_POINT * cost * n_points) + lit

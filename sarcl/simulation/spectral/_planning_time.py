@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Callable
+
 from ...base.errors import NotApplicable
 from ...base.text import duration
 from ...numerics import cost_model
@@ -16,26 +19,10 @@ class PlanningTime:
     pulses far from the scene, close to one another, has millions of these.
     """
 
-    def __init__(self, n_pulses: int, echo_seconds: float, longest: float | None = None) -> None:
+    def __init__(self, n_pulses: int, echo_seconds: Callable[[], float], longest: float | None = None) -> None:
         """echo_seconds  that `echo` would take;  longest  s, default PLANNED or what `echo` takes."""
-        self._n_pulses, self._echo = n_pulses, echo_seconds
-        self._longest = max(PLANNED, echo_seconds) if longest is None else longest
+        self._n_pulses, self._echo_seconds, self._longest = n_pulses, functools.cache(echo_seconds), longest
         self._spent = 0.0
-
-    @classmethod
-    def of_echo(
-        cls,
-        n_pulses: int,
-        n_scatterers: int,
-        n_samples: int,
-        n_polarizations: int,
-        of_facets: bool,
-        longest: float | None = None,
-    ) -> PlanningTime:
-        """No longer than `echo` takes for points or facets."""
-        each = cost_model.ECHO_FACET if of_facets else cost_model.ECHO_POINT
-        pulse = cost_model.ECHO_PULSE + cost_model.ECHO_SAMPLE * n_samples + each * n_scatterers
-        return cls(n_pulses, 1e-6 * n_pulses * n_polarizations * pulse, longest)
 
     def spend(self, samples: float, n_lags: int) -> None:
         """Take a step that transforms so many samples, of responses over n_lags pulse intervals.
@@ -43,9 +30,11 @@ class PlanningTime:
         NotApplicable where this plan would take longer than `echo`.
         """
         self._spent += 1e-6 * cost_model.SPECTRAL_PLANNED * samples
-        if self._spent > self._longest:
+        if self._spent <= (PLANNED if self._longest is None else self._longest):
+            return
+        if self._longest is not None or self._spent > self._echo_seconds():
             raise NotApplicable(
                 f"scatterers are seen over {n_lags} pulse intervals, of which the track has {self._n_pulses}; to plan "
                 f"their transforms would take spectral_echo more than {duration(self._spent)}, and echo takes about "
-                f"{duration(self._echo)} in all: use echo"
+                f"{duration(self._echo_seconds())} in all: use echo"
             )

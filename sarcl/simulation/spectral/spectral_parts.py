@@ -15,11 +15,12 @@ from ...numerics import cost_model
 from ...opencl.device import Device
 from ...scattering.facets import FacetSet
 from ...scattering.scatterers import Points
+from .._planned_echoes import EchoWork
 from ..echo_request import EchoRequest
 from ..scene_echoes import ChannelEchoes, SceneEchoes
 from ..scene_plan import ScenePlan, planned_scene, share_of
 from ..scene_preparation import prepare_scene
-from ..spreading import Counts
+from ..spreading import Band, Counts
 from ._planning_time import PlanningTime
 from ._scatterer_amplitudes import ScattererAmplitudes
 from ._spectral_part import PartTask, SpectralPart, plan_part
@@ -93,22 +94,23 @@ class PlannedParts:
         return total
 
 
-def plan_parts(task: SpectralTask, request: EchoRequest, longest: float | None = None) -> PlannedParts:
+def plan_parts(task: SpectralTask, request: EchoRequest, time: PlanningTime | None = None) -> PlannedParts:
     """The plan of a task's echoes.
 
-    request  that of the task, with the clock of this plan;  longest  seconds that its responses may take (PlanningTime)
+    request  that of the task, with the clock of this plan;  time  that it may take, default no longer than echo
     """
     seen, exact = task.seen, task.variant == "exact"
     request.report("scene", 0, 3)
     scene = planned_scene(request, seen, ())
     prepared = prepare_scene(scene, tiled=False, exact=exact)
     steady, direct = next(iter(prepared.facets), None), None
+    time = time or PlanningTime(len(task.track), lambda: _seconds_of_echo(task, scene))
     if exact:
         steady, direct = prepared.by_light(seen.antennas, seen.waveform)
     parts, terms = [], list(prepared.shadow_terms)
     for scatterers in (prepared.points if request.same else None, steady):
         if scatterers is not None:
-            part, term = _planned_part(task, prepared, scatterers, longest)
+            part, term = _planned_part(task, prepared, scatterers, time)
             parts.append(part)
             terms.append(term)
     if task.options.range_window is not None and request.gated:
@@ -122,8 +124,16 @@ def plan_parts(task: SpectralTask, request: EchoRequest, longest: float | None =
     return PlannedParts(task, scene, prepared, parts, channel, tuple(terms))
 
 
+def _seconds_of_echo(task: SpectralTask, scene: ScenePlan) -> float:
+    """About the seconds that `echo` takes for the same task, as its forecast has them before it times pulses."""
+    n_samples = len(task.frequencies)
+    band = Band(n_samples, task.seen.waveform.bandwidth, float(task.frequencies[0]))
+    request = replace(scene.request, method="auto")
+    return EchoWork.of(replace(scene, request=request, bands=(band,)), len(task.track), n_samples).seconds
+
+
 def _planned_part(
-    task: SpectralTask, prepared: SceneEchoes, scatterers: Points | FacetSet, longest: float | None
+    task: SpectralTask, prepared: SceneEchoes, scatterers: Points | FacetSet, time: PlanningTime
 ) -> tuple[SpectralPart, ErrorTerm]:
     """The plan of points or facets, and the term of its error."""
     request, line, waveform = prepared.request, task.line, task.seen.waveform
@@ -142,9 +152,6 @@ def _planned_part(
         request.polarizations,
         request.vertical,
         share if task.variant == "exact" else None,
-    )
-    time = PlanningTime.of_echo(
-        line.n_pulses, len(amplitudes.azimuth), len(task.frequencies), len(request.polarizations), of_facets, longest
     )
     part = plan_part(
         PartTask(

@@ -100,7 +100,7 @@ def test_the_map_of_an_edge_is_the_sum_over_scatterers_and_pulses(side, device):
     tangents = side * -0.004 + random.uniform(-1e-5, 0, n) * side
     inner = seen.low if side > 0 else seen.high
     places = edge.edge_places(tangents, azimuth, slant_range, side, inner, line)
-    task = edge.EdgeTask(seen, functions, np.eye(2), line, 1e-4, 1e-3, PlanningTime(200, 0.0))
+    task = edge.EdgeTask(seen, functions, np.eye(2), line, 1e-4, 1e-3, PlanningTime(200, lambda: 0.0))
     transfer, nodes = edge.plan_edge(task, places, 1e4)
     grid, numbers = edge.edge_wavenumbers(transfer, nodes, places.length, line)
     assert transfer.error <= 1e-4 and grid.n_lags >= line.n_pulses + places.length
