@@ -92,7 +92,7 @@ def parser() -> argparse.ArgumentParser:
     _flag(doctor, "--json", "print all that was found as JSON")
     demo = command("demo", "simulate the echoes of a scene, focus them and write the picture", device)
     _add(demo, "--out DIR", "folder for the results, made if missing (default out)", default="out")
-    _flag(demo, "--quick", "half the resolution, in a few seconds")
+    _flag(demo, "--quick", "half the resolution, in less time")
     _add(demo, "--seed", "seed of the random scene (default 0)", int, default=0)
     _simulate(command("simulate", "make the echoes that a scenario file describes, and their image", device))
     _focus(command("focus", "turn echoes into an image: backprojection, polar_format or range_doppler", device))
