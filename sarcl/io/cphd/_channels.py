@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
 
 from ..sarkit_library import Element, Refused, text_of
 
@@ -29,6 +32,15 @@ class Channel:
         sender, receiver = (LETTERS.get(name) for name in self.polarizations)
         return None if sender is None or receiver is None else sender + receiver
 
+    def fields(self, n_rows: int) -> dict[str, Any]:
+        """Fields of n_rows rows of a phase history that follow from the channel alone."""
+        return {
+            "tx_channel": np.full(n_rows, self.tx_channel),
+            "rx_channel": np.full(n_rows, self.rx_channel),
+            "polarization": None if self.polarization is None else np.full(n_rows, self.polarization),
+            "compressed": True,
+        }
+
 
 def channels_of(root: Element) -> list[Channel]:
     """All channels, in the order of the file. KeyError, ValueError for elements that are missing or wrong."""
@@ -50,8 +62,6 @@ def channels_of(root: Element) -> list[Channel]:
                 *numbers,
             )
         )
-    if not channels or min(min(c.n_vectors, c.n_samples) for c in channels) < 1:
-        raise ValueError("it has no channel with vectors and samples")
     return channels
 
 
@@ -59,7 +69,10 @@ def chosen(channels: Sequence[Channel], channel: str | int | None, polarization:
     """Channels of an Identifier or a number of a receiver's phase centre, and of a polarisation, of equal samples.
 
     Refused lists the channels where none is so, where they differ in samples, or some alone have a polarisation.
+    ValueError where a file has none, or one is empty.
     """
+    if not channels or min(min(c.n_vectors, c.n_samples) for c in channels) < 1:
+        raise ValueError("it has no channel with vectors and samples")
     for wanted, kind, name in ((channel, (str, int), "channel"), (polarization, str, "polarization")):
         if wanted is not None and (not isinstance(wanted, kind) or isinstance(wanted, bool)):
             raise Refused(f"has no {name} {wanted!r}: it has {_listed(channels)}")

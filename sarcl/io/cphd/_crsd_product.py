@@ -9,7 +9,7 @@ import numpy as np
 from ...base.constants import SPEED_OF_LIGHT
 from ..sarkit_library import Element
 from ._channels import ENDS
-from ._product import put_scene
+from ._product import dwell, put_scene
 
 if TYPE_CHECKING:
     from .crsd_writing import Crsd, ReceivedChannel, SentPulses
@@ -190,18 +190,9 @@ def _channel(crsd: Crsd, channel: ReceivedChannel, pvp: np.ndarray) -> dict[str,
 
 def _put_dwell(root: Element, crsd: Crsd) -> None:
     """The same dwell for all points of the scene: from the first pulse to the last, when they meet the scene."""
-    c, centres, lengths = crsd.collection, [], []
-    for channel in crsd.channels:
-        ends = channel.rows.rows[[0, -1]]
-        first, last = c.time[ends] + np.linalg.norm(c.tx[ends] - c.reference_point, axis=1) / SPEED_OF_LIGHT
-        centres.append({"Identifier": channel.rows.name, "CODTimePoly": np.array([[(first + last) / 2]])})
-        lengths.append({"Identifier": channel.rows.name, "DwellTimePoly": np.array([[last - first]])})
-    root["DwellPolynomials"] = {
-        "NumCODTimes": len(centres),
-        "CODTime": centres,
-        "NumDwellTimes": len(lengths),
-        "DwellTime": lengths,
-    }
+    c, ends = crsd.collection, [channel.rows.rows[[0, -1]] for channel in crsd.channels]
+    times = [c.time[i] + np.linalg.norm(c.tx[i] - c.reference_point, axis=1) / SPEED_OF_LIGHT for i in ends]
+    root["DwellPolynomials"] = dwell([channel.rows.name for channel in crsd.channels], times)
 
 
 def _put_arrays(root: Element, sequences: list[dict[str, Any]]) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 from types import ModuleType
 from typing import IO, Any
@@ -11,11 +10,12 @@ import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
 from ..formats import Make, T
-from ..sarkit_library import Element, FileRows, Reader, Refused, made_of, opened, parsing, text_of
+from ..sarkit_library import Element, Reader, Refused, made_of, opened, parsing, text_of
 from ..sarkit_library import library as sarkit_module
 from ._channels import ENDS, Channel, chosen
 from ._pulses import Records
-from ._reading import HEADER_BYTES, check_blocks, image_area, joined, text
+from ._reading import header, image_area, joined, text
+from ._signal_rows import VectorRows
 from .crsd_writing import since
 
 FINITE = ("TxTime", "TxPos", "TxVel", "RcvStart", "RcvPos", "RcvVel", "FRCV1", "FRCV2", "RefPhi0", "PhiX0")
@@ -51,13 +51,7 @@ def load(
 
 def _reader(library: ModuleType, file: IO[bytes]) -> tuple[Reader, int]:
     """sarkit's reader of an open file with all its blocks, and the byte at which its signals begin."""
-    end = file.seek(0, io.SEEK_END)
-    file.seek(0)
-    kind, keys = library.read_file_header(io.BytesIO(file.read(HEADER_BYTES)))
-    if kind.strip() != "CRSDsar/1.0":
-        raise Refused(f"is {kind.strip()!r:.40}; sarcl reads CRSDsar/1.0")
-    check_blocks(keys, ("XML", "SUPPORT", "PPP", "PVP", "SIGNAL"), end)
-    file.seek(0)
+    keys = header(library, file, ("CRSDsar/1.0",), ("XML", "SUPPORT", "PPP", "PVP", "SIGNAL"))
     reader = library.Reader(file)
     root = reader.metadata.xmltree.getroot()
     if root.find("{*}Data/{*}Receive/{*}SignalCompression") is not None:
@@ -95,8 +89,6 @@ def _channels(root: Element) -> list[Channel]:
         channels.append(
             Channel(name, int(text_of(size, "NumVectors")), int(text_of(size, "NumSamples")), kinds, *numbers)
         )
-    if not channels or min(min(c.n_vectors, c.n_samples) for c in channels) < 1:
-        raise ValueError("it has no channel with vectors and samples")
     return channels
 
 
@@ -135,21 +127,17 @@ def _rows(reader: Reader, file: IO[bytes], first: int, channel: Channel) -> dict
     rows = CompressedRows(file, first + _offset(root, channel), channel, vectors, records, (n, _dtype(root)))
     rows.phase = np.exp(2j * np.pi * (cycles - np.rint(cycles)))
     rows.mixer, rows.amplitude = np.array(pvp["RefFreq"]) - carrier, np.array(pvp["AmpSF"])
-    k = len(vectors)
     return {
         "samples": rows,
         "frequency": np.array(frequency),
-        "frequency_step": np.full(k, records.step),
+        "frequency_step": np.full(len(vectors), records.step),
         "tx": tx,
         "rx": rx,
         "reference_range": SPEED_OF_LIGHT * delay / 2,
         "time": np.array(ppp["TxTime"]["Int"] + ppp["TxTime"]["Frac"]),
-        "tx_channel": np.full(k, channel.tx_channel),
-        "rx_channel": np.full(k, channel.rx_channel),
-        "polarization": None if channel.polarization is None else np.full(k, channel.polarization),
         "tx_velocity": np.array(ppp["TxVel"]),
         "rx_velocity": np.array(pvp["RcvVel"]),
-        "compressed": True,
+        **channel.fields(len(vectors)),
         "waveform": {
             "center": float((ppp["FX1"] + ppp["FX2"])[0] / 2),
             "bandwidth": float((ppp["FX2"] - ppp["FX1"])[0]),
@@ -203,14 +191,12 @@ def _check(pvp: np.ndarray, ppp: np.ndarray, vectors: np.ndarray, channel: Chann
         raise Refused(f"has FRCV2 not above FRCV1 in channel {channel.name!r}: it is damaged")
 
 
-class CompressedRows(FileRows):
-    """Compressed spectra (n_rows, n), complex64, of the records of one channel; a slice reads its rows.
+class CompressedRows(VectorRows):
+    """Compressed spectra of the records of one channel.
 
-    phase     factor per row;  mixer  RefFreq - FxFreq0, Hz;  amplitude  AmpSF
-    filename  of the file, where it is one on a disk
+    phase  factor per row;  mixer  RefFreq - FxFreq0, Hz;  amplitude  AmpSF
     """
 
-    dtype = np.dtype(np.complex64)
     phase: np.ndarray
     mixer: np.ndarray
     amplitude: np.ndarray
@@ -225,11 +211,8 @@ class CompressedRows(FileRows):
         kind: tuple[int, np.dtype[Any]],
     ) -> None:
         """first  byte of the channel's signal;  kind  frequencies of a row, and the type of samples in the file"""
-        super().__init__(file, "samples", "dataclasses.replace(raw, samples=raw.read(0, raw.n_rows))")
-        self._first, self._channel, self._vectors, self._records, self._kind = first, channel, vectors, records, kind[1]
-        self.shape = (len(vectors), kind[0])
-        name = getattr(file, "name", None)
-        self.filename = name if isinstance(name, str) and self._stamp is not None else None
+        super().__init__(file, channel.name, vectors, kind[0])
+        self._first, self._channel, self._records, self._kind = first, channel, records, kind[1]
 
     def _read(self, low: int, high: int) -> np.ndarray:
         size = self._channel.n_samples * self._kind.itemsize
@@ -237,18 +220,9 @@ class CompressedRows(FileRows):
         data = self._file.read((high - low) * size)
         return np.frombuffer(data, self._kind).reshape(high - low, -1)
 
-    def __getitem__(self, rows: slice) -> np.ndarray:
-        start, stop, _ = rows.indices(self.shape[0])
-        if stop <= start:
-            return np.empty((0, self.shape[1]), self.dtype)
-        vectors, records, part = self._vectors[start:stop], self._records, slice(start, stop)
-        low, high = int(vectors[0]), int(vectors[-1]) + 1
-        values = self._of_file(
-            f"vectors {low} to {high - 1} of channel {self._channel.name!r}", lambda: self._read(low, high)
-        )[vectors - low]
-        if values.dtype.names:
-            values = values["real"].astype(np.float32) + 1j * values["imag"].astype(np.float32)
-        time = records.start[part, None] + np.arange(records.n) / records.rate
-        mix = np.exp(2j * np.pi * self.mixer[part, None] * time) if self.mixer[part].any() else 1.0
-        factor = (self.phase[part] * self.amplitude[part])[:, None]
-        return records.compressed(values * (factor * mix), part, self.shape[1]).astype(np.complex64)
+    def _converted(self, samples: np.ndarray, rows: slice) -> np.ndarray:
+        records = self._records
+        time = records.start[rows, None] + np.arange(records.n) / records.rate
+        mix = np.exp(2j * np.pi * self.mixer[rows, None] * time) if self.mixer[rows].any() else 1.0
+        factor = (self.phase[rows] * self.amplitude[rows])[:, None]
+        return records.compressed(samples * (factor * mix), rows, self.shape[1]).astype(np.complex64)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -157,17 +158,18 @@ def _put_channels(root: Element, collection: Collection, pvps: list[np.ndarray])
 
 def _put_dwell(root: Element, collection: Collection, library: ModuleType, pvps: list[np.ndarray]) -> None:
     """The same dwell for all points of the scene: from the first vector to the last."""
+    ends = [library.compute_t_ref_from_pvps(pvp[[0, -1]]).tolist() for pvp in pvps]
+    root["Dwell"] = dwell([channel.name for channel in collection.channels], ends)
+
+
+def dwell(names: Sequence[str], ends: Iterable[tuple[float, float]]) -> dict[str, Any]:
+    """Elements of the dwell of each channel, which is the same for all points;  ends  first and last time, s"""
     centres, lengths = [], []
-    for channel, pvp in zip(collection.channels, pvps, strict=True):
-        first, last = library.compute_t_ref_from_pvps(pvp[[0, -1]]).tolist()
-        centres.append({"Identifier": channel.name, "CODTimePoly": np.array([[(first + last) / 2]])})
-        lengths.append({"Identifier": channel.name, "DwellTimePoly": np.array([[last - first]])})
-    root["Dwell"] = {
-        "NumCODTimes": len(centres),
-        "CODTime": centres,
-        "NumDwellTimes": len(lengths),
-        "DwellTime": lengths,
-    }
+    for name, (first, last) in zip(names, ends, strict=True):
+        centres.append({"Identifier": name, "CODTimePoly": np.array([[(first + last) / 2]])})
+        lengths.append({"Identifier": name, "DwellTimePoly": np.array([[last - first]])})
+    n = len(names)
+    return {"NumCODTimes": n, "CODTime": centres, "NumDwellTimes": n, "DwellTime": lengths}
 
 
 def _is_fixed(pvp: np.ndarray, *names: str) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import IO, Any
@@ -70,14 +70,7 @@ def load(
 
 def _reader(library: ModuleType, file: IO[bytes]) -> Reader:
     """sarkit's reader of an open file, after a check that the file has its blocks."""
-    end = file.seek(0, io.SEEK_END)
-    file.seek(0)
-    head = io.BytesIO(file.read(HEADER_BYTES))
-    kind, keys = library.read_file_header(head)
-    if kind.strip() not in ("CPHD/1.0.1", "CPHD/1.1.0"):
-        raise Refused(f"is {kind.strip()!r:.40}; sarcl reads CPHD/1.0.1 and CPHD/1.1.0")
-    check_blocks(keys, ("XML", "PVP", "SIGNAL"), end)
-    file.seek(0)
+    keys = header(library, file, ("CPHD/1.0.1", "CPHD/1.1.0"), ("XML", "PVP", "SIGNAL"))
     reader = library.Reader(file)
     root = reader.metadata.xmltree.getroot()
     if any(
@@ -97,14 +90,22 @@ def _reader(library: ModuleType, file: IO[bytes]) -> Reader:
     return reader
 
 
-def check_blocks(keys: Mapping[str, str], blocks: Sequence[str], end: int) -> None:
-    """Refused names a block, of those that the header of a file of `end` bytes describes, that is not all there."""
+def header(library: ModuleType, file: IO[bytes], kinds: Sequence[str], blocks: Sequence[str]) -> dict[str, str]:
+    """The header of an open file, which is then at its begin. Refused where it is of none of the kinds, and names a
+    block that is not all there."""
+    end = file.seek(0, io.SEEK_END)
+    file.seek(0)
+    kind, keys = library.read_file_header(io.BytesIO(file.read(HEADER_BYTES)))
+    if kind.strip() not in kinds:
+        raise Refused(f"is {kind.strip()!r:.40}; sarcl reads {' and '.join(kinds)}")
     for block in blocks:
         first, size = int(keys[f"{block}_BLOCK_BYTE_OFFSET"]), int(keys[f"{block}_BLOCK_SIZE"])
         if first < 0 or size < 0 or first + size > end:
             raise Refused(
                 f"is truncated: its {block} block ends at byte {first + size}, the file at {end}; copy it again"
             )
+    file.seek(0)
+    return keys
 
 
 def _check_kind(root: Element) -> None:
@@ -168,12 +169,9 @@ def _rows(reader: Reader, file: IO[bytes], root: Element, channel: Channel, area
         "rx": rx,
         "reference_range": (path + SPEED_OF_LIGHT * advance) / 2,
         "time": np.array(pvp["TxTime"]),
-        "tx_channel": np.full(n_rows, channel.tx_channel),
-        "rx_channel": np.full(n_rows, channel.rx_channel),
-        "polarization": None if channel.polarization is None else np.full(n_rows, channel.polarization),
         "tx_velocity": np.array(pvp["TxVel"]),
         "rx_velocity": np.array(pvp["RcvVel"]),
-        "compressed": True,
+        **channel.fields(n_rows),
         "coupling": _coupling(pvp, area),
     }
 

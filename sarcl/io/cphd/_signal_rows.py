@@ -31,8 +31,6 @@ class Conversion:
 
     def converted(self, samples: np.ndarray, rows: slice, n: int) -> np.ndarray:
         """FX samples (k, n), complex64, relative to the new reference, of k rows of the file."""
-        if samples.dtype.names:  # pairs of integers
-            samples = samples["real"].astype(np.float32) + 1j * samples["imag"].astype(np.float32)
         if self.is_conjugate:
             samples = samples.conj()
         if self.toa is not None:
@@ -47,20 +45,18 @@ class Conversion:
         return samples.astype(np.complex64)
 
 
-class SignalRows(FileRows):
-    """FX samples (n_rows, n_samples), complex64, of one channel; a slice reads its rows.
+class VectorRows(FileRows):
+    """Samples (n_rows, n), complex64, of the rows of one channel; a slice reads its rows.
 
     filename  of the file, where it is one on a disk
     """
 
     dtype = np.dtype(np.complex64)
 
-    def __init__(
-        self, reader: Reader, file: IO[bytes], channel: str, vectors: np.ndarray, how: Conversion, n: int
-    ) -> None:
-        """reader  sarkit's, of the open file;  vectors  of each row, increasing;  n  frequencies of a row"""
+    def __init__(self, file: IO[bytes], channel: str, vectors: np.ndarray, n: int) -> None:
+        """vectors  of each row, increasing;  n  samples of a row"""
         super().__init__(file, "samples", "dataclasses.replace(raw, samples=raw.read(0, raw.n_rows))")
-        self._reader, self._channel, self._vectors, self._how = reader, channel, vectors, how
+        self._name_of_channel, self._vectors = channel, vectors
         self.shape = (len(vectors), n)
         name = getattr(file, "name", None)
         self.filename = name if isinstance(name, str) and self._stamp is not None else None
@@ -72,9 +68,35 @@ class SignalRows(FileRows):
         vectors = self._vectors[start:stop]
         first, last = int(vectors[0]), int(vectors[-1])
         samples = self._of_file(
-            f"vectors {first} to {last} of channel {self._channel!r}",
-            lambda: self._reader.read_signal(self._channel, start_vector=first, stop_vector=last + 1),
+            f"vectors {first} to {last} of channel {self._name_of_channel!r}", lambda: self._read(first, last + 1)
         )
         if len(vectors) < len(samples):  # some have no signal
             samples = samples[vectors - first]
-        return self._how.converted(samples, slice(start, stop), self.shape[1])
+        if samples.dtype.names:  # pairs of integers
+            samples = samples["real"].astype(np.float32) + 1j * samples["imag"].astype(np.float32)
+        return self._converted(samples, slice(start, stop))
+
+    def _read(self, low: int, high: int) -> np.ndarray:
+        """Samples of vectors low ... high - 1 as the file has them."""
+        raise NotImplementedError
+
+    def _converted(self, samples: np.ndarray, rows: slice) -> np.ndarray:
+        """The samples (k, n), complex64, of k rows, from numbers in the file."""
+        raise NotImplementedError
+
+
+class SignalRows(VectorRows):
+    """FX samples of one channel of a CPHD file."""
+
+    def __init__(
+        self, reader: Reader, file: IO[bytes], channel: str, vectors: np.ndarray, how: Conversion, n: int
+    ) -> None:
+        """reader  sarkit's, of the open file;  n  frequencies of a row"""
+        super().__init__(file, channel, vectors, n)
+        self._reader, self._how = reader, how
+
+    def _read(self, low: int, high: int) -> np.ndarray:
+        return np.asarray(self._reader.read_signal(self._name_of_channel, start_vector=low, stop_vector=high))
+
+    def _converted(self, samples: np.ndarray, rows: slice) -> np.ndarray:
+        return self._how.converted(samples, rows, self.shape[1])
