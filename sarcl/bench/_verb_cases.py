@@ -228,26 +228,15 @@ def noise(n: int, samples: int, track: Trajectory) -> PhaseHistory:
     )
 
 
-def backprojected_image(name: str, n: int) -> VerbCase:
-    """White noise of n pulses over 300 m on a plane of n x n pixels; against the exact sum."""
+def plane_image(name: str, n: int, *, verb: Callable[..., Image], sums: Callable[..., Any]) -> VerbCase:
+    """White noise of n pulses over 300 m on a plane of n x n pixels; against exact sums, of echoes and positions."""
     raw, grid = noise(n, n, straight(n, 300.0)), ImageGrid.plane(shape=(n, n), spacing=CELL / 2)
     index, places = grid.sample(CHECKED, seed=1)
 
     def compare(image: Image) -> Errors:
-        return exact.relative(image.data[index], *exact.backproject(raw, places))
+        return exact.relative(image.data[index], *sums(raw, places))
 
-    return VerbCase(name, n, n**3, functools.partial(verbs.backproject, raw, grid), compare)
-
-
-def polar_image(name: str, n: int) -> VerbCase:
-    """White noise of n pulses over 300 m on a plane of n x n pixels; against the exact sum of plane waves."""
-    raw, grid = noise(n, n, straight(n, 300.0)), ImageGrid.plane(shape=(n, n), spacing=CELL / 2)
-    index, places = grid.sample(CHECKED, seed=1)
-
-    def compare(image: Image) -> Errors:
-        return exact.relative(image.data[index], *polar_format(raw, places, np.zeros(3)))
-
-    return VerbCase(name, n, n**3, functools.partial(verbs.polar_format, raw, grid), compare)
+    return VerbCase(name, n, n**3, functools.partial(verb, raw, grid), compare)
 
 
 def range_doppler_image(name: str, n: int) -> VerbCase:
@@ -308,11 +297,14 @@ TASKS: Mapping[str, VerbTask] = {
         (64, 128),
     ),
     "backproject": VerbTask(
-        backprojected_image, "white noise, n pulses of n samples over 300 m at 9.9 km on n x n pixels of 0.25 m",
+        functools.partial(plane_image, verb=verbs.backproject, sums=exact.backproject),
+        "white noise, n pulses of n samples over 300 m at 9.9 km on n x n pixels of 0.25 m",
         "pulses x pixels", (512, 1024, 2048), (256, 512), BOTH,
     ),
     "polar format": VerbTask(
-        polar_image, "white noise, n pulses of n samples over 300 m at 9.9 km on n x n pixels of 0.25 m",
+        functools.partial(
+            plane_image, verb=verbs.polar_format, sums=functools.partial(polar_format, center=np.zeros(3))
+        ), "white noise, n pulses of n samples over 300 m at 9.9 km on n x n pixels of 0.25 m",
         "pulses x pixels", (512, 1024, 2048), (256, 512),
     ),
     "range-Doppler": VerbTask(

@@ -18,7 +18,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from ..base import wgs84
-from ..base.vectors import Floats
+from ..base.vectors import Floats, dot
 from .elevation import ElevationModel
 
 STEP = 0.25  # of the model's spacing, over which slopes are taken
@@ -53,10 +53,10 @@ def layers(
     ground = _Ground.of(model, longitude[full], latitude[full], height[full])
     tx, rx = (ground.turned(end[full] - ground.origin) for end in ends)
     normal, towards = ground.normals(), [_unit(tx), _unit(rx)]
-    out.incidence[full] = np.arccos(np.clip(_dot(normal, _unit(towards[0] + towards[1])), -1, 1))
+    out.incidence[full] = np.arccos(np.clip(dot(normal, _unit(towards[0] + towards[1])), -1, 1))
     is_dark = np.zeros(len(normal), bool)
     for direction in towards[: 1 if np.array_equal(tx, rx) else 2]:
-        is_dark |= (_dot(normal, direction) <= 0) | _meets(ground, _Ray(direction), 1)
+        is_dark |= (dot(normal, direction) <= 0) | _meets(ground, _Ray(direction), 1)
     out.shadow[full] = is_dark
     turned = [ground.turned(np.broadcast_to(v, tx.shape)) for v in speeds or ()]
     curve = _Curve(tx, rx, *(turned or [np.zeros_like(tx)] * 2))
@@ -157,16 +157,16 @@ class _Curve:
         path, rate, k, turn = np.zeros(len(d)), np.zeros(len(d)), np.zeros_like(d), np.zeros_like(d)
         for end, velocity in ((self.tx, self.tx_velocity), (self.rx, self.rx_velocity)):
             way, v = end[points] - d, velocity[points]
-            r = np.sqrt(_dot(way, way))
+            r = np.sqrt(dot(way, way))
             u = way / r[:, None]
-            along = _dot(v, u)
+            along = dot(v, u)
             path, rate, k = path + r, rate + along, k + u
             turn += (v - along[:, None] * u) / r[:, None]
-        rests = _dot(turn, turn) < STANDING**2
+        rests = dot(turn, turn) < STANDING**2
         look = (self.tx + self.rx)[points]
         side = _unit(np.stack([-look[:, 1], look[:, 0], np.zeros(len(d))], axis=-1))
         turn = np.where(rests[:, None], side, turn)
-        return k, turn, path, np.where(rests, -_dot(side, d), rate)
+        return k, turn, path, np.where(rests, -dot(side, d), rate)
 
     @cached_property
     def _first(self) -> tuple[Floats, Floats]:
@@ -180,7 +180,7 @@ class _Curve:
 
     def onto(self, points: np.ndarray, d: Floats) -> Floats:
         k, turn, path, rate = self._gradients(points, d)
-        kk, kt, tt = _dot(k, k), _dot(k, turn), _dot(turn, turn)
+        kk, kt, tt = dot(k, k), dot(k, turn), dot(turn, turn)
         first_path, first_rate = self._first
         excess, drift = path - first_path[points], rate - first_rate[points]
         determinant = kk * tt - kt**2
@@ -226,9 +226,4 @@ def _to_next_line(cells: Floats, rates: Floats, longest: float) -> Floats:
 
 
 def _unit(vectors: Floats) -> Floats:
-    return np.asarray(vectors / np.sqrt(_dot(vectors, vectors))[:, None])
-
-
-def _dot(a: Floats, b: Floats) -> Floats:
-    """Scalar products (n,) of vectors (n, 3)."""
-    return np.einsum("ni,ni->n", a, b)
+    return np.asarray(vectors / np.sqrt(dot(vectors, vectors))[:, None])

@@ -183,3 +183,13 @@ class Trajectory(NotebookTable):
             rate = arc / max(n - 1, 1) * prf
             tangent = np.stack([-np.sin(angle), np.cos(angle), zero], axis=-1)
             return cls(np.arange(n) / prf, center + ring, radius * rate * tangent)
+
+
+def receiver_positions(track: Trajectory, receiver: Trajectory | None) -> np.ndarray:
+    """Receiver positions, m (n_pulses, 3): those of the track without a receiver of its own."""
+    if receiver is None:
+        return track.positions
+    validation.instance("receiver", receiver, Trajectory)
+    if len(receiver) != len(track):
+        raise ValueError(f"receiver has {len(receiver)} positions but track has {len(track)}; give one per pulse")
+    return receiver.positions

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..base.report import ErrorTerm
+from ..model.trajectory import receiver_positions
 from ..numerics.pulse_geometry import PulseGeometry
 from . import echo_sampling
 from .echo_check import measure_error
@@ -32,7 +33,7 @@ class SingleChannel:
 
     def __init__(self, task: EchoTask) -> None:
         self.task = task
-        tx, rx = task.track.positions, echo_sampling.receiver_positions(task.track, task.receiver)
+        tx, rx = task.track.positions, receiver_positions(task.track, task.receiver)
         self.reference_range = echo_sampling.half_path(tx, rx, task.point)
         self.window = near, far = echo_sampling.window(
             task.scene, task.waveform, tx, rx, self.reference_range, task.options.range_window

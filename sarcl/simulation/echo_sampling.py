@@ -12,7 +12,7 @@ from ..base import wgs84
 from ..base.boxes import corners
 from ..base.constants import LEAST_STEP, SPEED_OF_LIGHT, WIDEST_SWATH
 from ..base.errors import warn
-from ..base.validation import converted, finite, instance
+from ..base.validation import converted, finite
 from ..earth.light_time import antennas_in_flight, receivers, transmitters
 from ..earth.viewing import hidden
 from ..model.trajectory import Trajectory
@@ -24,16 +24,6 @@ SOME_PULSES = 33  # at which the error of the receiver's positions over the scen
 DEEPEST = -12e3  # m: lower than any ground, the bottom of the sea included
 WIDE = -1e-6  # cosine of the bistatic angle below which forward scatter matters; 90 deg itself is not beyond
 LEAST_SAMPLES = 64  # in the default range window, so that a single point has a profile, too
-
-
-def receiver_positions(track: Trajectory, receiver: Trajectory | None) -> np.ndarray:
-    """Receiver positions (n_pulses, 3)."""
-    if receiver is None:
-        return track.positions
-    instance("receiver", receiver, Trajectory)
-    if len(receiver) != len(track):
-        raise ValueError(f"receiver has {len(receiver)} positions but track has {len(track)}; give one per pulse")
-    return receiver.positions
 
 
 def warn_of_wide_angles(to_tx: np.ndarray, to_rx: np.ndarray, forward: bool) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from ..base.errors import NotApplicable
 from ..base.validation import instance
 from ..model.antenna import Antenna
-from ..model.trajectory import Trajectory
+from ..model.trajectory import Trajectory, receiver_positions
 from ..model.waveform import Waveform
 from ..numerics.pulse_geometry import PulseGeometry
 from ..opencl.device import Device
@@ -70,7 +70,7 @@ def echo_task(scene: Scene, waveform: Waveform, track: Trajectory, options: Echo
     scene.kept.limit(KEPT * request.budget)
     point = scene.center if options.reference is None else np.asarray(options.reference)
     sends, hears, motion = echo_sampling.in_flight(track, options.receiver, scene, point)
-    echo_sampling.receiver_positions(sends, hears)
+    receiver_positions(sends, hears)
     # before the range window: rough terrain moves its corners
     real = scene.realized(request.seed).at_frequency(waveform.center)
     if len(real.triangles):
@@ -81,7 +81,7 @@ def echo_task(scene: Scene, waveform: Waveform, track: Trajectory, options: Echo
             )
         if options.bounces > 1 or options.edges:
             added_models.refuse(real, "bounces" if options.bounces > 1 else "edges", "leave it out")
-        tx, rx = sends.positions, echo_sampling.receiver_positions(sends, hears)
+        tx, rx = sends.positions, receiver_positions(sends, hears)
         refuse_with_sheets(options, real, PulseGeometry(tx, rx).ends)
         refuse_inside(real, *([tx] if hears is None else [tx, rx]))
         warn_of_coincident(scene)

@@ -11,7 +11,7 @@ from ..base.boxes import box
 from ..base.validation import instance, number, room
 from ..base.vectors import unit
 from ..model.image_grid import ImageGrid
-from ..model.trajectory import Trajectory
+from ..model.trajectory import Trajectory, receiver_positions
 from ..opencl.choose_device import open_device
 from ..opencl.device import DeviceChoice
 from ..opencl.memory_budget import budget
@@ -134,9 +134,4 @@ def pixel_shares(
 def _ends(track: Trajectory, receiver: Trajectory | None) -> list[np.ndarray]:
     """Positions of the antennas, m (n_pulses, 3), one or two."""
     instance("track", track, Trajectory)
-    if receiver is None:
-        return [track.positions]
-    instance("receiver", receiver, Trajectory)
-    if len(receiver) != len(track):
-        raise ValueError(f"receiver has {len(receiver)} positions but track has {len(track)}; give one per pulse")
-    return [track.positions, receiver.positions]
+    return [track.positions] if receiver is None else [track.positions, receiver_positions(track, receiver)]

@@ -12,7 +12,7 @@ import numpy as np
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.errors import ToleranceUnreachable, TooThin, warn
 from ...base.vectors import unit
-from ...model.trajectory import Trajectory
+from ...model.trajectory import Trajectory, receiver_positions
 from ...model.waveform import Waveform
 from ...numerics.pulse_geometry import half_path
 from ...opencl.device import Device
@@ -273,7 +273,7 @@ def fullwave_task(scene: Scene, waveform: Waveform, track: Trajectory, options: 
         raise ToleranceUnreachable(tolerance, LEAST_TOLERANCE, "float32 fields", how="with fields in float32")
     point = scene.center if options.reference is None else np.asarray(options.reference)
     track, receiver, motion = echo_sampling.in_flight(track, options.receiver, scene, point)
-    tx, rx = track.positions, echo_sampling.receiver_positions(track, receiver)
+    tx, rx = track.positions, receiver_positions(track, receiver)
     check_outside(scene, {"track": tx} if receiver is None else {"track": tx, "receiver": rx})
     reference_range = half_path(tx, rx, point)
     window = window_of(scene, waveform, tx, rx, reference_range, options.range_window)

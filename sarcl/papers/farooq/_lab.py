@@ -43,11 +43,10 @@ class Lab:
         places = np.asarray(points, np.float64)
         key = (replace(case, name=""), places.tobytes())
         if key not in self._kept:
-            step = case.channel_step
-            tone = Waveform.tone(center=case.center, duration=1 / step)
+            tone = Waveform.tone(center=case.center, duration=1 / case.channel_step)
             self._kept[key] = echo(
                 Scene.points(places), tone, case.track(), array=case.array(), reference=(0, 0, 0),
-                range_window=_window(step), tolerance=1e-4, check=False, device=self.device,
+                range_window=(-case.window, case.window), tolerance=1e-4, check=False, device=self.device,
             )  # fmt: skip
         return self._kept[key]
 
@@ -91,14 +90,6 @@ class Lab:
     def measure(self, raw: PhaseHistory, axis: int = 1, half: float = 2.0, about: float = 0.0) -> dict[str, float]:
         """Response of a point `about` m along the axis: what `sarcl.fda.response` measures on a cut."""
         return response(*self.cut(raw, axis, half, about=about), about)
-
-
-def _window(step: float) -> tuple[float, float]:
-    """Just inside the unambiguous range of carriers `step` Hz apart, m."""
-    from ...base.constants import SPEED_OF_LIGHT
-
-    half = 0.49 * SPEED_OF_LIGHT / (2 * step)
-    return -half, half
 
 
 def system(n: int, step: float, *, mirrored: bool = True, spacing: float | None = None, pulses: int = 431) -> Case:

@@ -9,9 +9,8 @@ import numpy as np
 
 from ...arrays.channels import Channel, Sampling
 from ...model.antenna_array import AntennaArray
-from ...model.trajectory import Trajectory
+from ...model.trajectory import Trajectory, receiver_positions
 from ...numerics.pulse_geometry import PulseGeometry, half_path
-from .. import echo_sampling
 
 
 class ChannelRows:
@@ -36,7 +35,7 @@ class ChannelRows:
         """point  the reference point, m (3,);  channels, receive: arguments of `sarcl.echo`."""
         self.array, self.point, self.receive = array, point, receive
         self.separated, self.polarizations = channels == "separated", polarizations
-        self.track = PulseGeometry(track.positions, echo_sampling.receiver_positions(track, receiver))
+        self.track = PulseGeometry(track.positions, receiver_positions(track, receiver))
         self.attitudes = track.attitude, (track if receiver is None else receiver).attitude
         self.receivers = array.positions if receive == "all" else np.zeros((1, 3))
 
