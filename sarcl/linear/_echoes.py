@@ -10,7 +10,6 @@ from typing import Literal, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.sparse import issparse
 from scipy.sparse.linalg import LinearOperator
 
 from ..base.errors import ToleranceUnreachable
@@ -31,6 +30,7 @@ from ._float32_pair import Image, PointEchoes
 from ._float64_pair import ROWS, TransposedImage, choice_of
 from ._gradients import KINDS, Gradients, Kind
 from ._measurement import Arguments, Domain, RowsAsRead, measurement_of
+from ._shape_errors import NamedOperator
 
 MOST_ROUNDS = 200  # of the power iteration
 # Errors of both directions are independent: <y, A x> - <A.H y, x> is smaller than they are by the root of the numbers
@@ -38,37 +38,7 @@ MOST_ROUNDS = 200  # of the power iteration
 MANY, LEAST_SHARE = 1000, 0.1
 
 
-class _Named(LinearOperator):
-    """A LinearOperator whose errors of shape name what was given, and both shapes.
-
-    domain  what a vector that it takes has a number for, in words
-    """
-
-    domain = "pixel"
-
-    def dot(self, x: ArrayLike) -> np.ndarray:
-        """self @ x of a vector (n,) or of columns (n, k); the product with a number or an operator is an operator."""
-        if isinstance(x, LinearOperator) or np.isscalar(x):
-            return super().dot(x)
-        if issparse(x):
-            raise TypeError(f"x is a {type(x).__name__}, and columns are dense arrays: give x.toarray()")
-        x = host_array(x)
-        if x.ndim not in (1, 2) or x.shape[0] != self.shape[1]:
-            raise ValueError(
-                f"x has shape {x.shape}, and the operator {self.shape}: give one number for each {self.domain}, "
-                f"({self.shape[1]},), or columns of them, ({self.shape[1]}, k)"
-            )
-        return np.asarray(self.matvec(x) if x.ndim == 1 else self.matmat(x))
-
-    def __matmul__(self, x: ArrayLike) -> np.ndarray:
-        return super().__matmul__(x) if np.isscalar(x) else self.dot(x)
-
-    def _matmat(self, x: np.ndarray) -> np.ndarray:
-        columns = [self.matvec(column) for column in x.T]
-        return np.stack(columns, axis=1) if columns else np.zeros((self.shape[0], 0), self.dtype)
-
-
-class _Adjoint(_Named):
+class _Adjoint(NamedOperator):
     """The adjoint of Echoes."""
 
     domain = "sample"
@@ -87,7 +57,7 @@ class _Adjoint(_Named):
         return self._of
 
 
-class Echoes(_Named):
+class Echoes(NamedOperator):
     """Echoes of points as a linear operator A of their amplitudes; A.H is the image of samples.
 
         (A x)_pn = w_p w_n W(f_pn) sum_k v_p(x_k) g_p(x_k) x_k exp(-j 2 pi f_pn (tau_k(p) - tau_ref(p)))

@@ -4,6 +4,7 @@ For other folders:
 
     antennas       positions of the antennas that a part of an image was made from
     map_grid       pixels on a regular grid of a map
+    picture_axes   axes of pictures of images, in metres or of a map
     saving         Image.save of GeoTIFF files
 
 For this folder alone:
