@@ -62,34 +62,38 @@ class Plan:
     def describe(self, method: str) -> dict[str, Any]:
         """The plan in words and numbers, for a report."""
         ranges = ("float32", "wide linear term", "wide", "linear term in two parts")[self.range_mode]
-        series = f"order {self.order}" if self.order else "exact"
+        series = series_words(self.order)
         if self.near.order:
             tiles = f"of {100 * self.near.share:.0f} % of the tiles"
             ranges, series = f"float32 {tiles}, else {ranges}", f"order {self.near.order} {tiles}, else {series}"
-        return {
-            "method": method,
-            "taps": self.interpolator.taps,
-            "profile samples": self.length,
-            "points per tile": self.per_tile,
-            "ranges": ranges,
-            "series": series,
-        }
+        return plan_words(method, self.interpolator, self.length, self.per_tile, ranges, series)
 
     def macros(self, bistatic: bool, wrap: bool = False) -> dict[str, int]:
         """Build-time macros of the kernels' headers."""
-        return {
-            "BISTATIC": int(bistatic),
-            "WRAP": self.length if wrap else 0,
-            "TAPS": self.interpolator.taps,
-            "TERMS": self.interpolator.terms,
-            "RANGE": self.range_mode,
-            "ORDER": self.order,
-            "NEAR": self.near.order,
-        }
+        of_profile = profile_macros(self.interpolator, self.length, wrap, self.order)
+        return {"BISTATIC": int(bistatic), **of_profile, "RANGE": self.range_mode, "NEAR": self.near.order}
 
     def components(self, bistatic: bool, beam: bool = False) -> int:
         """Floats of a (tile, pulse) record: N_CONST of kernels/geometry.clh."""
         return (32 if bistatic else 24 if self.range_mode in (1, 3) else 16) + 8 * beam
+
+
+def series_words(order: int) -> str:
+    """The order of a range series in words; 0 or less: exact."""
+    return f"order {order}" if order > 0 else "exact"
+
+
+def plan_words(
+    method: str, interpolator: Interpolator, length: int, per_tile: int, ranges: str, series: str
+) -> dict[str, object]:
+    """A plan by range profiles of `length` samples in words and numbers, for a report."""
+    words = {"method": method, "taps": interpolator.taps, "profile samples": length, "points per tile": per_tile}
+    return {**words, "ranges": ranges, "series": series}
+
+
+def profile_macros(interpolator: Interpolator, length: int, wrap: bool, order: int) -> dict[str, int]:
+    """Build-time macros of kernels that read range profiles of `length` samples, of which wrap=True repeats ranges."""
+    return {"WRAP": length if wrap else 0, "TAPS": interpolator.taps, "TERMS": interpolator.terms, "ORDER": order}
 
 
 class ProfileSums(NamedTuple):

@@ -11,6 +11,7 @@ from ...model.image_grid import ImageGrid
 from ...numerics import cost_model, error_bounds, interpolation, interpolator_choice
 from ...numerics.cost_model import DeviceClass
 from ...numerics.interpolation import Interpolator
+from ...numerics.plan import plan_words, profile_macros, series_words
 from ...numerics.pulse_geometry import PulseGeometry
 from ..focusing_task import FocusingTask
 from ._line_curvature import GroupCurvature, curvatures
@@ -64,23 +65,14 @@ class LinePlan:
 
     def describe(self, method: str) -> dict[str, object]:
         """The plan in words and numbers, for a report."""
-        return {
-            "method": method,
-            "taps": self.interpolator.taps,
-            "profile samples": self.length,
-            "points per tile": self.side**2,
-            "ranges": f"lines, {self.line.taps} taps, {self.fine} samples per pixel",
-            "series": f"order {self.order}" if self.order else "exact",
-        }
+        ranges, series = f"lines, {self.line.taps} taps, {self.fine} samples per pixel", series_words(self.order)
+        return plan_words(method, self.interpolator, self.length, self.side**2, ranges, series)
 
     def macros(self, bistatic: bool, wrap: bool, local: bool = False) -> dict[str, int]:
         """Build-time macros of kernels/backproject_lines.cl."""
         return {
             "BISTATIC": int(bistatic),
-            "WRAP": self.length if wrap else 0,
-            "TAPS": self.interpolator.taps,
-            "TERMS": self.interpolator.terms,
-            "ORDER": self.order,
+            **profile_macros(self.interpolator, self.length, wrap, self.order),
             "SIDE": self.side,
             "FINE": self.fine,
             "FINE_BITS": self.fine.bit_length() - 1,

@@ -12,6 +12,7 @@ from ...base.errors import ToleranceUnreachable
 from ...base.tolerances import askable, rounded_up
 from ...numerics import cost_model, error_bounds, interpolation, interpolator_choice
 from ...numerics.interpolation import Interpolator
+from ...numerics.plan import plan_words, profile_macros, series_words
 from .. import profile_energy
 from ..focusing_task import FocusingTask
 from ..profile_energy import ProfileEnergy
@@ -43,24 +44,12 @@ class Float64Plan:
 
     def describe(self, method: str) -> dict[str, object]:
         """The plan in words and numbers, for a report."""
-        return {
-            "method": method,
-            "taps": self.interpolator.taps,
-            "profile samples": self.length,
-            "points per tile": self.per_tile,
-            "ranges": "pairs of float64" if self.order == WIDE else "float64",
-            "series": f"order {self.order}" if self.order > 0 else "exact",
-        }
+        ranges, series = "pairs of float64" if self.order == WIDE else "float64", series_words(self.order)
+        return plan_words(method, self.interpolator, self.length, self.per_tile, ranges, series)
 
     def macros(self, wrap: bool) -> dict[str, int]:
         """Build-time macros of kernels/backproject_float64.cl that the plan sets."""
-        return {
-            "WRAP": self.length if wrap else 0,
-            "TAPS": self.interpolator.taps,
-            "TERMS": self.interpolator.terms,
-            "ORDER": self.order,
-            "CHUNK": CHUNK,
-        }
+        return {**profile_macros(self.interpolator, self.length, wrap, self.order), "CHUNK": CHUNK}
 
 
 def make_plan(task: FocusingTask, tolerance: float) -> tuple[Float64Plan, Tiling]:
