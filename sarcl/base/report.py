@@ -34,11 +34,13 @@ def root_sum_square(terms: Iterable[ErrorTerm]) -> float:
     return math.sqrt(sum(term.value**2 for term in terms))
 
 
-def terms_of_sum(errors: Mapping[str, float], remedy: str = SMALLER_TOLERANCE) -> tuple[ErrorTerm, ...]:
+def terms_of_sum(errors: Mapping[str, float]) -> tuple[ErrorTerm, ...]:
     """Terms of errors by cause that add up as they are: each has its part of the square of the sum, so that the terms
     too add up by their squares. Causes without error are left out."""
     total = sum(errors.values())
-    return tuple(ErrorTerm(name, math.sqrt(value * total), remedy) for name, value in errors.items() if value > 0)
+    return tuple(
+        ErrorTerm(name, math.sqrt(value * total), SMALLER_TOLERANCE) for name, value in errors.items() if value > 0
+    )
 
 
 @dataclass(frozen=True, eq=False)

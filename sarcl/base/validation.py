@@ -136,7 +136,7 @@ def converted(name: str, value: object, dtype: DTypeLike) -> np.ndarray:
         raise ValueError(f"{name} must be numbers that fit {number_type}, got {shown(value, 80)} ({why})") from None
 
 
-def unmasked(name: str, value: object, first_row: int = 0, remedy: str = "fill them, with 0 where nothing came") -> Any:
+def unmasked(name: str, value: object, first_row: int = 0) -> Any:
     """`value` without an empty mask; ValueError where values of a masked array are masked: they are no numbers.
 
     first_row  rows are counted from it
@@ -147,8 +147,8 @@ def unmasked(name: str, value: object, first_row: int = 0, remedy: str = "fill t
     if mask.any():
         place = first(mask, first_row)[1] or "[]"
         raise ValueError(
-            f"{name} has {int(mask.sum())} masked values, the first at {place}, which are no measurements; {remedy}: "
-            f"{name}.filled(0)"
+            f"{name} has {int(mask.sum())} masked values, the first at {place}, which are no measurements; fill "
+            f"them, with 0 where nothing came: {name}.filled(0)"
         )
     return value.data
 

@@ -16,9 +16,9 @@ def best(row: Row, name: str = "form") -> float | None:
     return min(runs) if runs else None
 
 
-def middle(row: Row, name: str = "form") -> float | None:
+def middle(row: Row) -> float | None:
     """The median of a row's seconds, or None."""
-    runs = row["seconds"].get(name)
+    runs = row["seconds"].get("form")
     return float(np.median(runs)) if runs else None
 
 

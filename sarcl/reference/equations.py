@@ -15,7 +15,7 @@ from scipy.special import roots_legendre
 
 from ..base.constants import SPEED_OF_LIGHT
 from ..base.vectors import unit
-from ..scattering.physical_optics import UP, normals_and_areas, polarisation
+from ..scattering.physical_optics import normals_and_areas, polarisation
 from .geometry import half_path
 
 # Delays
@@ -72,7 +72,6 @@ def conductor_echo(
     rx: np.ndarray,
     reference_range: float,
     nodes: int = 60,
-    up: tuple[float, float, float] = UP,
 ) -> np.ndarray:
     """s_rt(f) = integral of k/(2 sqrt(pi)) e_r.(2 n x (k_i x e_t)) exp(-j 2 pi f (tau - tau_ref)) dA, m (n_f, 2, 2).
 
@@ -81,8 +80,8 @@ def conductor_echo(
     """
     points, areas = triangle_nodes(triangle, nodes)
     normal, away, back = normals_and_areas(triangle[None])[0][0], unit(points - tx), unit(rx - points)
-    current = [2 * np.cross(normal, np.cross(away, e)) for e in polarisation(away, up)]
-    matrix = np.array([[(e * j).sum(axis=1) for j in current] for e in polarisation(-back, up)])
+    current = [2 * np.cross(normal, np.cross(away, e)) for e in polarisation(away)]
+    matrix = np.array([[(e * j).sum(axis=1) for j in current] for e in polarisation(-back)])
     matrix = matrix * ((away @ normal < 0) & (back @ normal > 0)) * areas
     delay = excess_delay(tx, rx, points, reference_range)
     cycles = ((np.longdouble(1) * frequencies[:, None] * delay) % 1).astype(np.float64)

@@ -111,7 +111,6 @@ def sheet_echo(
     reference_range: float,
     *,
     size: float,
-    up: tuple[float, float, float] = UP,
 ) -> np.ndarray:
     """Echo of the smooth facets of a scene, past opaque ones and through sheets, m complex128 (n_f, 2, 2) [r, t].
 
@@ -135,10 +134,10 @@ def sheet_echo(
             rows = np.flatnonzero(seen & (scene.material[of] == number))
             eps, sides = material.permittivity(f), (looks[0][rows], looks[1][rows])
             if material.thickness:
-                matrix[rows] = _sheet_amplitude(corners[rows], (eps, material.thickness), f, sides, up)
+                matrix[rows] = _sheet_amplitude(corners[rows], (eps, material.thickness), f, sides)
             else:
-                matrix[rows] = facet_amplitude(corners[rows], eps, f, *sides, up)
-        ways = [_through(scene, distance, -look, f, up) for distance, look in zip(met, looks, strict=True)]
+                matrix[rows] = facet_amplitude(corners[rows], eps, f, *sides)
+        ways = [_through(scene, distance, -look, f) for distance, look in zip(met, looks, strict=True)]
         wave = np.exp(-2j * np.pi * ((2 * np.longdouble(f) * path / np.longdouble(SPEED_OF_LIGHT)) % 1).astype(float))
         total.append(ways[1].swapaxes(1, 2) @ matrix @ ways[0] * (wave * scene.reflectivity[of])[:, None, None])
     return np.array(total).sum(axis=1)
@@ -183,12 +182,10 @@ def _met(scene: Scene, places: np.ndarray, antenna: np.ndarray) -> np.ndarray:
     return out
 
 
-def _through(
-    scene: Scene, distance: np.ndarray, sight: np.ndarray, frequency: float, up: tuple[float, float, float]
-) -> np.ndarray:
+def _through(scene: Scene, distance: np.ndarray, sight: np.ndarray, frequency: float) -> np.ndarray:
     """What sheets let through of H and V of an antenna, complex128 (n, 2, 2), along lines of sight (n, 3), which meet
     facets at `distance` (n, k), m, from their far ends."""
-    axes = np.stack(polarisation(sight, up), axis=1)
+    axes = np.stack(polarisation(sight), axis=1)
     field = np.swapaxes(axes, 1, 2).astype(complex)  # columns: unit fields along H, V
     normal = normals_and_areas(scene.triangles)[0]
     order = np.argsort(-np.where(np.isinf(distance), -1, distance), axis=1)
@@ -213,12 +210,11 @@ def _sheet_amplitude(
     slab: tuple[complex | np.ndarray, float],
     frequency: float,
     looks: tuple[np.ndarray, np.ndarray],
-    up: tuple[float, float, float],
 ) -> np.ndarray:
     """As `facet_amplitude`, of pieces of a sheet of a permittivity and a thickness, m: what lies behind counts too."""
     k = 2 * np.pi * frequency / SPEED_OF_LIGHT
     normal = normals_and_areas(corners)[0]
-    cosine, parts = scattering_parts(normal, *looks, up)
+    cosine, parts = scattering_parts(normal, *looks, UP)
     r_h, r_v, t_h, t_v = (a[:, None, None] for a in film(np.clip(cosine, 1e-12, 1), *slab, frequency))
     matrix = parts[0] + r_h * parts[1] + r_v * parts[2] - t_h * parts[3] - t_v * (parts[0] - parts[3])
     integral = triangle_integral(corners, k * (looks[0] + looks[1]))

@@ -96,10 +96,10 @@ def unmodelled_shift(rest: np.ndarray) -> float:
     return float(max(np.abs(ends - middle).max(), np.abs(middle).max()))
 
 
-def sampled_groups(n_rows: int, group: int, most: int = SAMPLED_GROUPS) -> np.ndarray:
-    """First rows of up to `most` groups spread over all rows."""
+def sampled_groups(n_rows: int, group: int) -> np.ndarray:
+    """First rows of up to SAMPLED_GROUPS groups spread over all rows."""
     starts = np.arange(0, max(n_rows - group, 0) + 1, group)
-    return starts[spread_over(len(starts), most)]
+    return starts[spread_over(len(starts), SAMPLED_GROUPS)]
 
 
 @dataclass(frozen=True)
