@@ -14,7 +14,7 @@ from ..sarkit_library import Element, Reader, Refused, made_of, opened, parsing,
 from ..sarkit_library import library as sarkit_module
 from ._channels import ENDS, Channel, chosen
 from ._pulses import Records
-from ._reading import header, image_area, joined, text
+from ._reading import header, image_area, joined, refuse_any, text
 from ._signal_rows import VectorRows
 from .crsd_writing import since
 
@@ -166,12 +166,7 @@ def _check(pvp: np.ndarray, ppp: np.ndarray, vectors: np.ndarray, channel: Chann
             values = values["Frac"]
         values = values.reshape(len(pvp), -1)
         is_bad = ~np.isfinite(values).all(axis=1) | ((values <= 0).any(axis=1) if name in POSITIVE else False)
-        if is_bad.any():
-            i = int(np.argmax(is_bad))
-            raise Refused(
-                f"has {name} = {values[i].tolist()} in vector {int(vectors[i])} of channel {channel.name!r}, wanted "
-                f"{'positive' if name in POSITIVE else 'finite'}: it is damaged, or was not filled in"
-            )
+        refuse_any(is_bad, name, values, vectors, channel, "positive" if name in POSITIVE else "finite")
     if pvp["FICRate"].any() or pvp["DFIC0"].any():
         raise Refused("has dechirped records (FICRate, DFIC0), which sarcl does not read; have them written without")
     for name in ("TXmt", "FxRate"):

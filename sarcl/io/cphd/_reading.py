@@ -225,13 +225,20 @@ def _check_parameters(pvp: np.ndarray, vectors: np.ndarray, channel: Channel, ro
             is_bad, wanted = is_bad | (pvp["TOA2"] < pvp["TOA1"]), "at least TOA1"
         if name == "FX2":
             is_bad, wanted = is_bad | (pvp["FX2"] <= pvp["FX1"]), "more than FX1"
-        if is_bad.any():
-            i = int(np.argmax(is_bad))
-            value = values[i].tolist() if values.shape[1] > 1 else float(values[i, 0])
-            raise Refused(
-                f"has {name} = {value} in vector {int(vectors[i])} of channel {channel.name!r}, wanted {wanted}: it is "
-                "damaged, or was not filled in by the program that wrote it"
-            )
+        refuse_any(is_bad, name, values, vectors, channel, wanted)
+
+
+def refuse_any(
+    is_bad: np.ndarray, name: str, values: np.ndarray, vectors: np.ndarray, channel: Channel, wanted: str
+) -> None:
+    """Refused names the first of vectors (n,) whose values (n, k) of a parameter are bad, and what was wanted."""
+    if is_bad.any():
+        i = int(np.argmax(is_bad))
+        value = values[i].tolist() if values.shape[1] > 1 else values[i, 0].item()
+        raise Refused(
+            f"has {name} = {value} in vector {int(vectors[i])} of channel {channel.name!r}, wanted {wanted}: it is "
+            "damaged, or was not filled in by the program that wrote it"
+        )
 
 
 def joined(values: list[Any]) -> Any:
