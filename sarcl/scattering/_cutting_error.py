@@ -188,7 +188,7 @@ class CuttingError:
         each; of  facets (n,)."""
         places, finer = centroids(pieces), [pieces]
         for _ in range(bisections):
-            finer = [half for one in finer for half in _halves(one)]
+            finer = [half for one in finer for half in bisect(one, np.asarray(edges(one)))]
         parts = [(pieces, np.zeros(len(pieces)))]
         parts += [(one, path_beyond(ends, places, centroids(one) - places)) for one in finer]
         seen = _Seen([(one, *self._scattering(one, of, ends), path) for one, path in parts])
@@ -248,7 +248,3 @@ def _hidden(rays: SceneRays, places: np.ndarray, facets: np.ndarray, ends: Ends)
     """Whether other facets hide places, m (n, 3), on facets (n,), from one of both antennas."""
     ways = ends[:1] if np.array_equal(*ends) else ends
     return np.any([rays.any_hit(places, np.tile(end, (len(places), 1)), leaving=facets) for end in ways], axis=0)
-
-
-def _halves(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    return bisect(triangles, np.asarray(edges(triangles)))

@@ -67,7 +67,8 @@ def dihedral_rcs(size: ArrayLike, direction: ArrayLike, frequency: ArrayLike) ->
     >>> round(float(10 * np.log10(section)), 2)  # dBsm
     44.11
     """
-    across, along = (validation.number(f"size[{i}]", v, above=0) for i, v in enumerate(_pair("size", size)))
+    sides = validation.array("size", size, np.float64, (2,))
+    across, along = (validation.number(f"size[{i}]", v, above=0) for i, v in enumerate(sides))
     x, y, z = np.moveaxis(_directions(direction), -1, 0)
     drift = across * np.abs(y) / np.maximum(np.maximum(x, z), LEAST_COSINE)
     lost = np.minimum(drift, along)
@@ -123,10 +124,6 @@ def check_brim(disc_radius: float, cylinder_radius: float) -> None:
             f"disc_radius is {disc_radius:g} m and cylinder_radius {cylinder_radius:g} m; the disc must reach beyond "
             "the cylinder: without it no beam is reflected twice"
         )
-
-
-def _pair(name: str, value: ArrayLike) -> np.ndarray:
-    return validation.array(name, value, np.float64, (2,))
 
 
 def _directions(direction: ArrayLike) -> np.ndarray:

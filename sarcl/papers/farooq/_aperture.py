@@ -88,7 +88,7 @@ def switched(lab: Lab) -> Section:
         out.keep(**{name: named})
         gap = float(np.diff(mapped["published"].tx[:, 1]).max())
         if n == 45:
-            out.states("switched aperture", gap, gap > 2 * _step(raw.tx), source=figure)
+            out.states("switched aperture", gap, gap > 2 * np.abs(np.diff(raw.tx[:, 1])).max(), source=figure)
             _outer(out, lab, figure)
             curves.append(("actual", raw.tx[::THIN, 1], raw.tx[::THIN, 1]))
         curves.append((name, raw.tx[::THIN, 1], mapped["published"].tx[::THIN, 1]))
@@ -138,7 +138,3 @@ def nulls(lab: Lab) -> Section:
     out.say()
     out.plot("The centre point", curves)
     return out
-
-
-def _step(places: np.ndarray) -> float:
-    return float(np.abs(np.diff(places[:, 1])).max())

@@ -46,7 +46,7 @@ def section(lab: Lab) -> Section:
         out.states(item, own, own < TOLERANCE, worst=errors.own.max())
         degrees = np.degrees(errors.angle)
         curves = [("one anchor, as in the paper", errors.one), (f"{anchors} anchors", errors.own)]
-        curves_db = [(label, degrees, _db(error)) for label, error in curves]
+        curves_db = [(label, degrees, 20 * np.log10(np.maximum(error, 1e-6))) for label, error in curves]
         out.plot("Error of waveform forming at each azimuth", curves_db)
         own_seconds = sum(report.seconds.values())
         seconds = errors.seconds[0] * n, errors.seconds[1], own_seconds
@@ -95,7 +95,3 @@ def compared(lab: Lab, name: str) -> Comparison:
         (float(np.linalg.norm(errors[0])) / total, float(np.linalg.norm(errors[1])) / total),
         (seconds[0] / len(pulses), seconds[1]),
     )
-
-
-def _db(error: np.ndarray) -> np.ndarray:
-    return np.asarray(20 * np.log10(np.maximum(error, 1e-6)))

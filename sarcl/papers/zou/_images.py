@@ -52,7 +52,7 @@ def section(name: str, lab: Lab) -> Section:
     sampled = {polarization: view.range_doppler(chain) for polarization, chain in chains.items()}
     for polarization, image in sampled.items():
         caption = f"{polarization}, range-Doppler image of the samples (figure 7 {target.letter})."
-        out.draw(view.picture(_amplitudes(image), caption))
+        out.draw(view.picture(np.abs(np.asarray(image.data)) / image.gain, caption))
     images = {polarization: np.abs(view.backprojected(raw)) for polarization, raw in raws.items()}
     for polarization, pixels in images.items():
         out.draw(view.picture(pixels, f"{polarization}, backprojection of the echoes."))
@@ -151,10 +151,6 @@ def _outline(lab: Lab, name: str) -> list[tuple[str, Any, Any]]:
     around = ConvexHull(np.column_stack([slant, azimuth])).vertices
     closed = np.append(around, around[0])
     return [("outline", slant[closed], azimuth[closed])]
-
-
-def _amplitudes(image: Image) -> np.ndarray:
-    return np.abs(np.asarray(image.data)) / image.gain
 
 
 def _samples(raw: PhaseHistory) -> np.ndarray:
