@@ -3,18 +3,18 @@ from border to border of a face, from the elements of one of them."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TypeAlias
 
 import numpy as np
 
 from ..base.constants import SPEED_OF_LIGHT
 from ..base.vectors import unit
-from ..scattering.physical_optics import polarisation
+from ..scattering.physical_optics import UP, polarisation
 
 BorderFrame: TypeAlias = tuple[np.ndarray, np.ndarray, np.ndarray, float, float]
 # ln of the variable of integration, on whose scale integrands are smooth
 NODES = np.arange(-16.0, 1.7, 0.1)
-ELEMENTS = 20.0  # per shortest wavelength, along an edge or a border
 BESIDE_POLE = 1e-5  # rad: where both currents are infinite, their difference is taken at either side
 
 
@@ -25,26 +25,31 @@ def edge_echo(
     antennas: tuple[np.ndarray, np.ndarray],
     reference_range: float,
     *,
-    per_wavelength: float = ELEMENTS,
+    up: tuple[float, float, float] = UP,
+    seen: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None,
+    per_wavelength: float = 20,
 ) -> np.ndarray:
     """Echo of one edge of a conductor, complex128 (n_f, 2, 2) [r, t], m: 0 is H and 1 is V.
 
     ends  m (2, 3);  frame  of its wedge: inward, normal, number, as sarcl.scene.wedges has them
     antennas  places of transmitter and receiver, m (3,) each;  reference_range  m
+    seen  (places, antenna) -> whether it sees them (n,); None: it does
     per_wavelength  elements, each a plane wave with the directions and the path of its own middle
     """
     (tx, rx), way = antennas, ends[1] - ends[0]
     n = int(np.linalg.norm(way) * per_wavelength * frequencies.max() / SPEED_OF_LIGHT) + 1
     places = ends[0] + (np.arange(n) + 0.5)[:, None] / n * way
     looks = [unit(end - places) for end in (tx, rx)]
-    received = polarisation(-looks[1])
+    received = polarisation(-looks[1], up)
     matrix = np.empty((n, 2, 2), complex)
-    for t, field in enumerate(polarisation(-looks[0])):
+    for t, field in enumerate(polarisation(-looks[0], up)):
         current = fringe(frame, looks[0], looks[1], field)
         for r in range(2):
             matrix[:, r, t] = (received[r] * current).sum(axis=1) / (2 * np.sqrt(np.pi))
     if np.array_equal(tx, rx):
         matrix = (matrix + matrix.swapaxes(1, 2)) / 2
+    if seen is not None:
+        matrix *= (seen(places, tx) & seen(places, rx))[:, None, None]
     path = np.linalg.norm(places - tx, axis=1) + np.linalg.norm(places - rx, axis=1) - 2 * reference_range
     k = 2 * np.pi * frequencies / SPEED_OF_LIGHT
     turn = ((looks[0] + looks[1]) @ way / n)[:, None] * k
@@ -92,6 +97,10 @@ def border_echo(
     frequencies: np.ndarray,
     antennas: tuple[np.ndarray, np.ndarray],
     reference_range: float,
+    *,
+    up: tuple[float, float, float] = UP,
+    seen: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None,
+    per_wavelength: float = 20,
 ) -> np.ndarray:
     """Echo of the waves between two borders of a face, both ways, complex128 (n_f, 2, 2) [r, t], m.
 
@@ -101,7 +110,7 @@ def border_echo(
     out = np.zeros((len(frequencies), 2, 2), complex)
     x1, x2, normal, number1, number2 = frame
     for lines, faces in ((borders, frame), (borders[::-1], (x2, x1, normal, number2, number1))):
-        one, other, size = _elements(lines, faces, antennas, ELEMENTS * frequencies.max() / SPEED_OF_LIGHT)
+        one, other, size = _elements(lines, faces, antennas, per_wavelength * frequencies.max() / SPEED_OF_LIGHT)
         if not size:
             continue
         g, k = unit((other - one).sum(axis=0)), 2 * np.pi * frequencies[:, None] / SPEED_OF_LIGHT
@@ -114,12 +123,13 @@ def border_echo(
         ends = zip((one, other), antennas, faces[:2], faces[3:], (g, -g), strict=True)
         for place, antenna, x, number, way in ends:
             look, t = unit(antenna - place), np.cross(x, normal)
-            fields.append([np.cross(-look, e) @ t for e in polarisation(-look)])
+            fields.append([np.cross(-look, e) @ t for e in polarisation(-look, up)])
             phi, end = np.arctan2(look @ normal, look @ x) % (2 * np.pi), np.pi / number
             keller = 2 / number * np.sin(end) / (np.cos(phi / number) - np.cos(end)) * np.cos(phi / 2) ** 2
             detours.append(1 + look @ way)
             sine = np.linalg.norm(np.cross(look, t), axis=1)
             factor = factor * keller * np.sqrt(2 * sine * (way @ x) / detours[-1]) * (phi <= np.pi * number)
+            factor = factor if seen is None else factor * seen(place, antenna)
         across, along = unit(x1 - x2), np.cross(unit(faces[0] - faces[1]), normal)
         factor = factor / (np.abs(g @ across) * (np.cross(faces[0], normal) @ along) ** 2)
         wave *= factor * _spectrum(*(np.sqrt(phase * one) for one in detours))
