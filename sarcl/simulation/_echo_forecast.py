@@ -207,7 +207,7 @@ def _spectral(task: EchoTask, work: EchoWork, seconds: float) -> str:
         n_points = len(task.scene.positions)
         if 1e-6 * (cost_model.SPECTRAL_PLAN + cost_model.SPECTRAL_PLAN_POINT * n_points) > longest:
             return f"not planned: that takes long beside echo, about {duration(seconds)}"
-        from .spectral._planning_time import PlanningTime
+        from .spectral.planning_time import PlanningTime
         from .spectral.spectral_parts import plan_parts  # imports scipy
 
         with warnings.catch_warnings():

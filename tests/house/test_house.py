@@ -236,10 +236,10 @@ def test_the_description_of_the_wheel_has_no_link_that_leads_nowhere(wheel):
 def test_links_of_the_description_lead_to_the_page_of_the_repository():
     place, text = {"__file__": str(ROOT / "setup.py")}, (ROOT / "setup.py").read_text()
     exec(text[: text.index("class SourcesAndTests")], place)  # the functions alone: nothing is built
-    page = "![a](b.png) [c `d` [e]](docs/f.md#g) [h](https://i.example) [j](#k)"
+    page = "![a](b.png) [c `d` [e]](pages/f.md#g) [h](https://i.example) [j](#k)"
     assert place["description"](page, None) == "c `d` [e] [h](https://i.example) [j](#k)"
     here = "https://host.example/own/sarcl"
-    wanted = f"![a]({here}/raw/HEAD/b.png) [c `d` [e]]({here}/blob/HEAD/docs/f.md#g) [h](https://i.example) [j](#k)"
+    wanted = f"![a]({here}/raw/HEAD/b.png) [c `d` [e]]({here}/blob/HEAD/pages/f.md#g) [h](https://i.example) [j](#k)"
     assert place["description"](page, here + "/") == wanted
 
 

@@ -2,6 +2,7 @@
 
 For other folders:
 
+    planning_time           how long a plan may take
     spectral_echo           spectral_echo(): the samples of echo, to a stated tolerance
     spectral_parts          the plan of a scene: parts that are transformed, facets that are added pulse by pulse
     spectral_task           one task of spectral_echo: its arguments, checked; what is refused
@@ -19,7 +20,6 @@ For this folder alone:
     _map_part               one map of a part of a scene, with its transfer functions
     _map_plan               grid of the map, and the range wavenumbers at which its spectrum is read
     _map_spectrum           the map's spectrum at the range wavenumbers of every frequency
-    _planning_time          how long a plan may take
     _scatterer_amplitudes   amplitudes of points and facets, seen from places on the track
     _scratch                complex arrays in memory or in temporary files
     _spectral_blocks        spectra as a job that is computed in blocks

@@ -22,8 +22,8 @@ from ...base.errors import NotApplicable, ToleranceUnreachable
 from ...numerics.polynomials import chebyshev, lagrange
 from ...opencl import fft
 from ._aspect_window import Aspects, DopplerGrid, KnownPhase, ResponsePhase, wavenumber
-from ._planning_time import PlanningTime
 from ._straight_track import StraightTrack, tangent
+from .planning_time import PlanningTime
 
 # Ranges and frequencies of the tables, and width of their margins in Fresnel zones, that are tried one after the other.
 TRIED = ((1, 1, 4), (1, 2, 4), (2, 2, 4), (2, 3, 4), (3, 3, 4), (3, 4, 16), (4, 4, 64), (6, 8, 64))

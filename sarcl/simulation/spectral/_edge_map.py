@@ -27,9 +27,9 @@ from ._aspect_window import Aspects, DopplerGrid, wavenumber
 from ._azimuth_transfer import SAFETY, AzimuthTransfer, Functions
 from ._map_part import MapPart
 from ._map_plan import RangeWavenumbers, plan_map, scatterers_per_cell
-from ._planning_time import PlanningTime
 from ._scatterer_amplitudes import ScattererAmplitudes
 from ._straight_track import StraightTrack, tangent
+from .planning_time import PlanningTime
 
 # Nodes over s_k, 1/R_k and frequency, and cells of the table per pulse of D, that are tried one after the other.
 TRIED = ((2, 1, 1, 8), (2, 2, 2, 8), (3, 2, 2, 8), (3, 3, 3, 16), (4, 4, 4, 16), (6, 6, 6, 32), (8, 8, 8, 32))

@@ -35,10 +35,10 @@ from ._facet_factors import FacetFactors
 from ._map_part import MapPart, SpectrumRows
 from ._map_plan import plan_map, range_wavenumbers, scatterers_per_cell, tile_of
 from ._map_spectrum import ReflectivityMap
-from ._planning_time import PlanningTime
 from ._scatterer_amplitudes import ScattererAmplitudes
 from ._stationary_phase import stationary_tables
 from ._straight_track import StraightTrack, tangent
+from .planning_time import PlanningTime
 
 # Shares of the tolerance: of amplitudes over aspect, transfer functions, what lies outside the beam, the grids.
 EXPANSION, TRANSFER, OUTSIDE, GRID = 0.35, 0.25, 0.15, 0.2

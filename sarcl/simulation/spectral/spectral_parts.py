@@ -21,10 +21,10 @@ from ..scene_echoes import ChannelEchoes, SceneEchoes
 from ..scene_plan import ScenePlan, planned_scene, share_of
 from ..scene_preparation import prepare_scene
 from ..spreading import Band, Counts
-from ._planning_time import PlanningTime
 from ._scatterer_amplitudes import ScattererAmplitudes
 from ._spectral_part import PartTask, SpectralPart, plan_part
 from ._straight_track import StraightTrack
+from .planning_time import PlanningTime
 from .spectral_task import SpectralTask
 
 WINDOW_PULSES = 33  # pulses at which scatterers are compared with a range window that was asked for

@@ -13,8 +13,8 @@ from sarcl.simulation.spectral import _azimuth_transfer
 from sarcl.simulation.spectral._aspect_expansion import AmplitudeSamples, AspectExpansion, expand
 from sarcl.simulation.spectral._aspect_window import aspects, wavenumber
 from sarcl.simulation.spectral._azimuth_transfer import response_error, transfer_tables
-from sarcl.simulation.spectral._planning_time import PlanningTime
 from sarcl.simulation.spectral._straight_track import straight_track, tangent
+from sarcl.simulation.spectral.planning_time import PlanningTime
 
 
 def ones(sines, frequency):

@@ -17,8 +17,8 @@ from sarcl.simulation.spectral._aspect_window import aspects, wavenumber
 from sarcl.simulation.spectral._beam_edges import beam_edges, continued_weights
 from sarcl.simulation.spectral._map_plan import plan_map, tile_of
 from sarcl.simulation.spectral._map_spectrum import ReflectivityMap
-from sarcl.simulation.spectral._planning_time import PlanningTime
 from sarcl.simulation.spectral._straight_track import straight_track
+from sarcl.simulation.spectral.planning_time import PlanningTime
 
 CHIRP = sarcl.Waveform.chirp(center=9.6e9, bandwidth=150e6, duration=2e-6)
 LOOK, DISTANCE, SPACING = float(np.arctan2(8e3, 6e3)), 1e4, 0.4
