@@ -11,6 +11,7 @@ For other folders:
     echo_sampling      rows and frequencies that echoes are written to
     echo_task          one task of echo: its arguments, checked
     kernel_images      error of scatterers that lie so evenly that the images of the interpolation kernel add up
+    planned_echoes     the method of echoes, the plan of the scene for it, and how much work they are
     reflection_options options of several reflections and of edges
     scene_defects      facets that lie on one another, and antennas inside bodies
     scene_echoes       a scene prepared for the kernels, and its echoes added channel by channel
@@ -34,7 +35,6 @@ For this folder alone:
     _echo_blocks       echoes as a job that is computed in blocks of pulses
     _echo_forecast     rows, bytes, seconds and errors of a plan of echoes, before the work
     _echo_plan         the plan of echoes, and its run
-    _planned_echoes    the method of echoes, the plan of the scene for it, and how much work they are
     _single_channel    echoes of one transmitting and one receiving antenna
     _unseen_scene      refusal of scenes outside every beam or range window, before anything is planned
 """

@@ -13,10 +13,10 @@ from ..blocks.bands import BandBuffer, FlatArray, Run
 from ..blocks.block_job import BlockJob
 from ..opencl.device import Device
 from ..opencl.memory_budget import budget
-from ._planned_echoes import PlannedEchoes
 from .echo_files import job_description
 from .echo_output import pulses_at_once
 from .echo_task import EchoTask
+from .planned_echoes import PlannedEchoes
 from .scene_echoes import Added, SceneEchoes
 
 # of a block: fewer bytes of samples take longer to write, unless its contributions take about a second

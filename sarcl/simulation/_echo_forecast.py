@@ -23,13 +23,13 @@ from ..base.stage_timer import Clock
 from ..base.text import duration
 from ..model.phase_history import PhaseHistory
 from ..numerics import cost_model
-from ._planned_echoes import EchoWork, Method, PlannedEchoes
 from ._single_channel import SingleEchoes
 from .bounces.bounce_spreader import PULSES_AT_ONCE, BounceScene, BounceSpreader
 from .echo_output import bytes_of
 from .echo_task import EchoTask
 from .edges.edge_echoes import EdgeEchoes, PreparedEdges
 from .factorized.spreader import FactorizedSpreader
+from .planned_echoes import EchoWork, Method, PlannedEchoes
 from .scene_echoes import Added, SceneEchoes
 from .scene_plan import EDGES, SHADOWS, ScenePlan, parts_of, samples_shadows
 from .scene_preparation import warn_of_shapes

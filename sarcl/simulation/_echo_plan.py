@@ -17,7 +17,6 @@ from ..blocks.fill_bands import BandFiller
 from ..model.phase_history import PhaseHistory
 from ._echo_blocks import EchoEngine, EchoRecipe, echo_job
 from ._echo_forecast import forecast_of
-from ._planned_echoes import Channels, PlannedEchoes
 from ._single_channel import SingleChannel
 from .channels.array_channels import ArrayChannels
 from .echo_check import worth_checking
@@ -26,6 +25,7 @@ from .echo_options import EchoOptions
 from .echo_output import EchoOutput
 from .echo_request import EchoRequest
 from .echo_task import EchoTask
+from .planned_echoes import Channels, PlannedEchoes
 from .scene_echoes import Added, SceneEchoes
 from .spreading import Counts
 

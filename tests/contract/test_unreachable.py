@@ -245,7 +245,7 @@ def interpolated(verb=sarcl.echo):
 PLANTED = {
     "interpolated channels": ("sarcl.simulation.channels._interpolated.InterpolatedChannels.fill", interpolated),
     "planning of interpolated channels": ("sarcl.simulation.scene_plan.plan_scene", interpolated),
-    "a scene made ready": ("sarcl.simulation._planned_echoes.prepare_scene", interpolated),
+    "a scene made ready": ("sarcl.simulation.planned_echoes.prepare_scene", interpolated),
     "forecast of echoes": (
         "sarcl.simulation.channels._interpolated.InterpolatedChannels.fill",
         lambda: interpolated(functools.partial(sarcl.plan, sarcl.echo)),

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ...figures.decibels import PixelAxes
-from ..image_grid import ImageGrid
+
+if TYPE_CHECKING:
+    from ..image_grid import ImageGrid
 
 
 def picture_axes(grid: ImageGrid) -> PixelAxes:

@@ -15,8 +15,8 @@ from ...numerics import cost_model
 from ...opencl.device import Device
 from ...scattering.facets import FacetSet
 from ...scattering.scatterers import Points
-from .._planned_echoes import EchoWork
 from ..echo_request import EchoRequest
+from ..planned_echoes import EchoWork
 from ..scene_echoes import ChannelEchoes, SceneEchoes
 from ..scene_plan import ScenePlan, planned_scene, share_of
 from ..scene_preparation import prepare_scene
