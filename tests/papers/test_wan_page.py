@@ -10,7 +10,8 @@ import pytest
 from sarcl import papers
 from sarcl.cli import parser
 from sarcl.opencl.choose_device import open_device
-from sarcl.papers.lab import SIGNIFICANT, Lab, tested
+from sarcl.papers import lab
+from sarcl.papers.lab import SIGNIFICANT, Lab
 from sarcl.papers.paper import Section
 
 DIFFERENT = {"coefficient as permittivity grows", "phase of an echo from 0.02 m farther, L band"}
@@ -26,7 +27,7 @@ def test_errors_in_print_are_measured():
 def test_the_test_of_phases_is_said_as_a_verdict():
     out = Section.of("wan", "speckle")
     for p in (0.999, 1e-4):
-        out.states("phases", p, p > SIGNIFICANT, verdict=tested(p))
+        out.states("phases", p, p > SIGNIFICANT, verdict=lab.tested(p))
     assert [row.measured for row in out.rows] == ["not rejected: p = 1", "rejected: p = 1.0e-04"]
 
 
