@@ -9,7 +9,6 @@ import gpu_session
 import numpy as np
 import pytest
 
-from sarcl.bench import exact
 from sarcl.bench.verbs import TASKS
 
 
@@ -44,13 +43,6 @@ def test_linear_interpolation_of_critical_samples_has_the_error_of_its_formula(t
     for row, weights in zip(json.loads(path.read_text())["rows"], (np.hamming(400), np.ones(400)), strict=True):
         expected = np.sqrt((weights**2 @ wrong.mean(axis=1)) / (weights**2).sum())
         assert row["ok"] and row["error"] == pytest.approx(expected, rel=0.1)  # 1024 pixels of one draw of noise
-
-
-def test_the_exact_sum_in_parts_is_that_in_one():
-    raw = gpu_session.spaceborne(gpu_session.white(7, 16))
-    points = np.random.default_rng(0).uniform(-1, 1, (5, 3))
-    (image, norm), (wanted, spread) = gpu_session.exact_sum(raw, points), exact.backproject(raw, points)
-    assert np.abs(image - wanted).max() < 1e-12 * np.abs(wanted).max() and norm == pytest.approx(spread, rel=1e-12)
 
 
 def test_a_row_that_fails_is_written_and_the_next_one_too(tmp_path):
