@@ -40,6 +40,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from sarcl.bench.verbs import VerbCase
+    from sarcl.model.image_grid import ImageGrid
     from sarcl.model.phase_history import PhaseHistory
     from sarcl.opencl.device import Device
 
@@ -49,9 +50,6 @@ FINEST = {"echo of points": 1e-5, "backproject": 1e-5}  # tolerance measured bes
 ECHOES = ("echo of points", "echo of facets", "echo with edges", "echo with bounces", "spectral echo")
 IMAGES = ("backproject", "polar format", "range-Doppler")
 METHODS = ("direct", "factorized")
-PULSES, SIDE = 11_566, 8192  # of the public benchmark: pulses; samples of each, and pixels a side
-CENTER, BANDWIDTH = 9.65e9, 600e6  # Hz
-DISTANCE, STEP, SPACING = 770e3, 1.5, 0.25  # m: of the antenna, between pulses, between pixels
 CHECKED = 1024  # pixels that are compared with the exact sum
 RUNS = 3  # of a measurement of time, after the one that builds the kernels
 LIBRARIES = "/usr/local/nvidia/lib64", "/usr/local/nvidia/lib", "/usr/lib/x86_64-linux-gnu", "/usr/lib64"  # folders
@@ -97,37 +95,20 @@ def append(path: Path, row: Row) -> None:
     print(", ".join(f"{k} {v:.4g}" if isinstance(v, float) else f"{k} {v}" for k, v in row.items())[:300], flush=True)
 
 
-def spaceborne(samples: np.ndarray) -> PhaseHistory:
-    """Echoes along a straight track 770 km away, 53 deg up; samples complex64 (pulses, samples)."""
+def setting(small: bool, n_pulses: int = 0) -> tuple[PhaseHistory, ImageGrid]:
+    """White noise along the track of the public benchmark, by default all its pulses, and the grid of its pixels."""
     import sarcl
+    from sarcl.bench import spaceborne
 
-    n_pulses, n_samples = samples.shape
-    along = (np.arange(n_pulses) - n_pulses / 2) * STEP
-    tx = np.stack([np.full(n_pulses, 0.6 * DISTANCE), along, np.full(n_pulses, 0.8 * DISTANCE)], axis=1)
-    return sarcl.PhaseHistory(
-        samples,
-        frequency=CENTER - BANDWIDTH / 2,
-        frequency_step=BANDWIDTH / n_samples,
-        tx=tx,
-        reference_range=np.linalg.norm(tx, axis=1),
-    )
+    n = 128 if small else spaceborne.SIDE
+    raw = spaceborne.phase_history(white(spaceborne.pulses(n) if small or not n_pulses else n_pulses, n))
+    return raw, sarcl.ImageGrid.plane(shape=(n, n), spacing=spaceborne.SPACING)
 
 
 def white(n_pulses: int, n_samples: int) -> np.ndarray:
     """White noise, complex64 (n_pulses, n_samples), seeded."""
     random = np.random.default_rng(1)
     return random.standard_normal((n_pulses, 2 * n_samples), np.float32).view(np.complex64)
-
-
-def exact_sum(raw: PhaseHistory, points: np.ndarray) -> tuple[np.ndarray, float]:
-    """The exact sum at points, m (m, 3), and its norm with random phases, on all processors."""
-    from sarcl.bench import exact
-
-    n = os.cpu_count() or 1
-    parts = [raw[a:b] for a, b in itertools.pairwise(np.linspace(0, raw.n_rows, n + 1).astype(int)) if a < b]
-    with ThreadPoolExecutor(n) as pool:
-        images, norms = zip(*pool.map(lambda part: exact.backproject(part, points), parts), strict=True)
-    return sum(images), math.hypot(*norms)
 
 
 def verb_row(case: VerbCase, device: Device, tolerance: float, *, runs: int, check: bool, method: str) -> Row:
@@ -203,10 +184,10 @@ def rate(session: Session) -> None:
     import sarcl
     from sarcl.bench import exact
 
-    opened, n_pulses, n = session.device(), *((70, 128) if session.small else (PULSES, SIDE))
-    raw, grid = spaceborne(white(n_pulses, n)), sarcl.ImageGrid.plane(shape=(n, n), spacing=SPACING)
+    opened, (raw, grid) = session.device(), setting(session.small)
+    n_pulses, n = raw.samples.shape
     index, points = grid.sample(CHECKED, seed=1)
-    wanted, norm = exact_sum(raw, points)
+    wanted, norm = exact.backproject(raw, points)
 
     def image(method: str, tolerance: float) -> Row:
         options = {"tolerance": tolerance, "method": method, "check": False, "device": opened}
@@ -222,15 +203,14 @@ def rate(session: Session) -> None:
 
 def public(session: Session) -> None:
     """Linear interpolation of profiles with one sample per 1/bandwidth: errors against the exact sum."""
-    import sarcl
-    from sarcl.bench import baseline, exact
+    from sarcl.bench import baseline, exact, spaceborne
 
-    n_pulses, n = (70, 128) if session.small else (PULSES, SIDE)
-    points = sarcl.ImageGrid.plane(shape=(n, n), spacing=SPACING).sample(CHECKED, seed=1)[1]
+    raw, grid = setting(session.small)
+    points, n = grid.sample(CHECKED, seed=1)[1], raw.n_samples
 
     def work(weights: np.ndarray) -> Row:
-        raw = spaceborne(white(n_pulses, n) * weights.astype(np.float32))
-        error = exact.relative(baseline.backproject(raw, points, finer=1), *exact_sum(raw, points))[0]
+        weighted = spaceborne.phase_history(raw.samples * weights.astype(np.float32))
+        error = exact.relative(baseline.backproject(weighted, points, finer=1), *exact.backproject(weighted, points))[0]
         return {"error": error, "dB": decibels(error)}
 
     for window, weights in (("Hamming", np.hamming(n)), ("none", np.ones(n))):
@@ -287,8 +267,7 @@ def memory(session: Session) -> None:
     """An image within less memory than it would take, and ten times the device's, which must not break the device."""
     import sarcl
 
-    opened, n_pulses, n = session.device(), *((70, 128) if session.small else (4096, SIDE))
-    raw, grid = spaceborne(white(n_pulses, n)), sarcl.ImageGrid.plane(shape=(n, n), spacing=SPACING)
+    opened, (raw, grid) = session.device(), setting(session.small, 4096)
     options = {"tolerance": 1e-3, "method": "direct", "check": False, "device": opened}
 
     def work(bound: float | None) -> Row:
@@ -302,9 +281,11 @@ def memory(session: Session) -> None:
 def threads(session: Session) -> None:
     """The same image by four threads at once and alone."""
     import sarcl
+    from sarcl.bench import spaceborne
 
     opened, n = session.device(), 64 if session.small else 512
-    raw, grid = spaceborne(white(n, n)), sarcl.ImageGrid.plane(shape=(n, n), spacing=SPACING)
+    raw = spaceborne.phase_history(white(n, n))
+    grid = sarcl.ImageGrid.plane(shape=(n, n), spacing=spaceborne.SPACING)
 
     def image() -> np.ndarray:
         return sarcl.backproject(raw, grid, tolerance=1e-3, method="direct", check=False, device=opened).data

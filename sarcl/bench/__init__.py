@@ -10,6 +10,7 @@ For other folders:
     one_shot       one image in a process of its own: python -m sarcl.bench.one_shot
     pareto         plot of rate against achieved error; needs the extra `plots`
     ratios         rates, ratios at equal or smaller error, cost against size
+    spaceborne     pulses and pixels of the public GPU benchmark
     tables         measurements as tables
     verb_pictures  run time of a verb against achieved error, and against size
     verbs          every verb, on tasks of its own

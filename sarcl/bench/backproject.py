@@ -26,14 +26,14 @@ TOLERANCES = (1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 1e-5, 1e-6)
 class Setting(Measuring):
     """What is measured, and how.
 
-    scenes, data   see `_cases.make`;  sizes  pulses = samples = pixels a side
+    scenes, data   see `_cases.make`;  sizes  pulses = samples = pixels a side, of "spaceborne" samples and pixels
     methods        "direct", "factorized", "auto"
     peer_python    an interpreter that has fastsar, default this one;  peer_backend  which of its backends
     with_peers     NumPy and fastsar are measured too
     pixels         number of pixels checked against the exact sum, at least 256
     """
 
-    scenes: Sequence[str] = _cases.SCENES
+    scenes: Sequence[str] = _cases.DEFAULT_SCENES
     sizes: Sequence[int] = (1024,)
     tolerances: Sequence[float] = TOLERANCES
     methods: Sequence[str] = ("direct", "factorized")
@@ -48,6 +48,8 @@ class Setting(Measuring):
         super().__post_init__()
         for scene in self.scenes:
             choice("scene", scene, _cases.SCENES)
+        if "spaceborne" in self.scenes:
+            choice("data of spaceborne", self.data or "noise", ("noise",))
         for method in self.methods:
             choice("method", method, METHODS)
         count("pixels", self.pixels, least=256)

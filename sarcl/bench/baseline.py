@@ -34,7 +34,8 @@ def backproject(raw: PhaseHistory, points: np.ndarray, finer: int = FINER) -> np
 
 def competitors(case: BenchCase) -> list[Competitor]:
     """The one competitor. It takes some of the pulses; its seconds are scaled to all n."""
-    rows = min(case.n, max(1, round(PAIRS / case.grid.size)))
+    pulses = case.raw.n_rows
+    rows = min(pulses, max(1, round(PAIRS / case.grid.size)))
     raw = case.raw[:rows]
     points = case.grid.at(*np.indices(case.grid.shape)).reshape(-1, 3)
 
@@ -44,6 +45,6 @@ def competitors(case: BenchCase) -> list[Competitor]:
         seconds, busy = time.perf_counter() - start, time.process_time() - busy
         return Reading(image[case.at[0], case.at[1]], {"call": seconds, "form": seconds, "cpu": busy})
 
-    setting = f"linear, {FINER} x" + (f"; {rows} pulses, seconds times {case.n / rows:.0f}" if rows < case.n else "")
+    setting = f"linear, {FINER} x" + (f"; {rows} pulses, seconds times {pulses / rows:.0f}" if rows < pulses else "")
     check = exact.backproject(raw, case.grid.at(*case.at))
-    return [Competitor("NumPy", "one thread", "direct", setting, run, check=check, share=rows / case.n)]
+    return [Competitor("NumPy", "one thread", "direct", setting, run, check=check, share=rows / pulses)]

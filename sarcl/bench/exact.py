@@ -8,6 +8,11 @@ precision. The two agree to 1e-11.
 
 from __future__ import annotations
 
+import itertools
+import math
+import os
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 
 from ..base.constants import SPEED_OF_LIGHT
@@ -37,7 +42,16 @@ def phases(delay: np.ndarray, frequency: float, step: float, n_samples: int) -> 
 
 
 def backproject(raw: PhaseHistory, points: np.ndarray) -> tuple[np.ndarray, float]:
-    """I complex128 (m,) at points, m (m, 3), and its norm if contributions had random phases."""
+    """I complex128 (m,) at points, m (m, 3), and its norm if contributions had random phases; on all processors."""
+    n = os.cpu_count() or 1
+    parts = [raw[a:b] for a, b in itertools.pairwise(np.linspace(0, raw.n_rows, n + 1).astype(int)) if a < b]
+    with ThreadPoolExecutor(n) as pool:
+        images, norms = zip(*pool.map(lambda part: _backproject(part, points), parts), strict=True)
+    return np.sum(images, axis=0), math.hypot(*norms)
+
+
+def _backproject(raw: PhaseHistory, points: np.ndarray) -> tuple[np.ndarray, float]:
+    """As `backproject`, on one processor."""
     image, power = np.zeros(len(points), np.complex128), 0.0
     for p in range(raw.n_rows):
         delay = 2 / np.longdouble(SPEED_OF_LIGHT) * half_path(raw.tx[p], raw.rx[p], points, raw.reference_range[p])

@@ -33,8 +33,7 @@ def title(result: ratios.Result) -> str:
     if "words" in result:
         return f"{result['scene']}, n = {result['n']}: {result['words']}"
     return (
-        f"{result['scene']}, {result['data']}, n = {result['n']}: {WORDS[result['scene']]}; n pulses of n samples on "
-        f"n x n pixels"
+        f"{result['scene']}, {result['data']}, n = {result['n']}: {WORDS[result['scene']]} of n samples on n x n pixels"
     )
 
 

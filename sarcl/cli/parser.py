@@ -232,7 +232,8 @@ def _bench(p: argparse.ArgumentParser) -> None:
     what = p.add_argument_group("what is measured")
     _flag(what, "--quick", "verbs: small tasks, few tolerances, one run; at most 3 CPU minutes")
     _add(what, "--verbs NAME", "verbs: names of tasks, such as 'echo of points' (default all)", nargs="+")
-    _add(what, "--scenes", "images: tracks (default both)", choices=["spotlight", "straight"], nargs="+")
+    scenes = ["spotlight", "straight", "spaceborne"]
+    _add(what, "--scenes", "images: tracks (default the first two)", choices=scenes, nargs="+")
     _add(what, "--data", "images: default noise for spotlight, points for straight", choices=["noise", "points"])
     _add(what, "--sizes N", "of the tasks; of images: pulses, samples, image side (default 1024)", int, nargs="+")
     _add(what, "--tolerances T", "of images: default 1e-1 to 1e-6", float, nargs="+")

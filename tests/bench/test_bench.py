@@ -13,7 +13,7 @@ import pytest
 import report as page
 
 import sarcl
-from sarcl.bench import _cases, _measure, _peers, _wait_idle, documents, exact, pareto, ratios, tables
+from sarcl.bench import _cases, _measure, _peers, _wait_idle, documents, exact, pareto, ratios, spaceborne, tables
 from sarcl.bench import backproject as bench
 from sarcl.bench import baseline as numpy_baseline
 from sarcl.bench._competitor import Absent, Competitor, Reading
@@ -238,6 +238,7 @@ def test_the_exponent_of_cost_against_size():
         ({"scenes": ["moon"]}, "moon"),
         ({"methods": ["fast"]}, "fast"),
         ({"data": "silence"}, "silence"),
+        ({"scenes": ["spaceborne"], "data": "points"}, "data of spaceborne"),
         ({"peer_python": "/no/such/python"}, "no program"),
     ],
 )
@@ -247,6 +248,15 @@ def test_bad_input_is_found_before_the_work(options, said):
 
 
 SMALL = {"scenes": ["straight"], "sizes": [16], "tolerances": [1e-2], "repeats": 2, "pixels": 256, "devices": ["cpu"]}
+
+
+def test_images_of_the_public_gpu_benchmark_of_any_size():
+    options = {"sizes": [32], "methods": ["direct"], "with_peers": False, "repeats": 1}
+    (case,) = bench.run(**{**SMALL, **options, "scenes": ["spaceborne"]})["cases"]
+    assert (case["data"], case["n"], case["pairs"]) == ("noise", 32, 45 * 32**2)
+    assert all(0 < row["error"] <= row["predicted"] <= 1e-2 for row in case["rows"])
+    assert "770 km, 0.25 m pixels; 1.41 n pulses of n samples" in tables.title(case)
+    assert spaceborne.pulses(8192) == 11566 and _cases.make("spaceborne", 8).raw.n_rows == spaceborne.pulses(8) == 11
 
 
 @pytest.mark.slow

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import sys
+from pathlib import Path
 
 import gpu_session
 import numpy as np
 import pytest
 
-from sarcl.bench import exact
 from sarcl.bench.verbs import TASKS
 
 
@@ -46,11 +46,16 @@ def test_linear_interpolation_of_critical_samples_has_the_error_of_its_formula(t
         assert row["ok"] and row["error"] == pytest.approx(expected, rel=0.1)  # 1024 pixels of one draw of noise
 
 
-def test_the_exact_sum_in_parts_is_that_in_one():
-    raw = gpu_session.spaceborne(gpu_session.white(7, 16))
-    points = np.random.default_rng(0).uniform(-1, 1, (5, 3))
-    (image, norm), (wanted, spread) = gpu_session.exact_sum(raw, points), exact.backproject(raw, points)
-    assert np.abs(image - wanted).max() < 1e-12 * np.abs(wanted).max() and norm == pytest.approx(spread, rel=1e-12)
+def test_the_page_has_every_measured_rate_with_its_error():
+    root = Path(gpu_session.__file__).parents[1]
+    page = (root / "docs" / "developers" / "benchmarks.md").read_text()
+    rows = json.loads((root / "bench" / "results" / "gpu" / "h100.json").read_text())["rows"]
+    rates = [row for row in rows if row["stage"] == "rate"]
+    assert len(rates) == len(gpu_session.METHODS) * len(gpu_session.TOLERANCES)
+    for row in rates:
+        error = f"{row['tolerance']:.0e} | {row['error']:.1e} | {row['dB']:.0f} dB | {row['predicted']:.1e}"
+        line = f"| {row['method']} | {error} | {min(row['seconds']):.1f} | {row['G_per_s']:.0f} |"
+        assert line.replace("e-0", "e-") in page and row["error"] <= row["predicted"] <= row["tolerance"]
 
 
 def test_a_row_that_fails_is_written_and_the_next_one_too(tmp_path):

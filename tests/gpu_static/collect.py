@@ -159,6 +159,11 @@ class PaperDevice(Device):
     def finish(self) -> None:
         pass
 
+    @property
+    def bounds_registers(self) -> bool:
+        """As NVIDIA's driver."""
+        return True
+
     def max_group(self, kernel: Any) -> int:
         return self.info.max_group
 

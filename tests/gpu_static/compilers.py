@@ -1,4 +1,4 @@
-"""Compilers for GPUs that are not here: clang with libclc, then ptxas for NVIDIA; clang alone for AMD."""
+"""Compilers for GPUs that are not here: clang and libclc, then ptxas for NVIDIA; clang for AMD; ocloc for Intel."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import re
 import shutil
 import subprocess
 import sysconfig
+import tempfile
 from pathlib import Path
 
 from gpu_static.collect import Variant
@@ -17,6 +18,13 @@ CLANG = "clang-19"
 LIBRARY = Path("/usr/lib/clc")  # of Debian's package libclc-19: OpenCL's built-in functions as LLVM bitcode
 NVIDIA, AMD = ("sm_80", "sm_90"), ("gfx90a", "gfx1100")
 TARGETS = (*NVIDIA, *AMD)
+MORE = ("sm_89", "sm_120")  # NVIDIA's GPUs for graphics, for the kernels that make images
+IMAGES = (
+    "assemble_image.cl", "backproject.cl", "backproject_float64.cl", "backproject_shared_lines.cl",
+    "expand_subapertures.cl", "merge_subapertures.cl", "nufft2d.cl", "range_doppler.cl", "range_profiles.cl",
+    "schedule_pulses.cl", "tile_constants.cl", "tile_constants_float64.cl", "transposition.cl", "weighted_samples.cl",
+)  # fmt: skip
+INTEL, OCLOC = "dg2", "ocloc"  # Intel's Arc; the compiler is Debian's package intel-opencl-icd, or Ubuntu's intel-ocloc
 REMEDY = "type: sh .ci/setup.sh gpu-static"
 COMMON = ("-x", "cl", "-cl-std=CL1.2", "-O3", "-nogpulib", "-Wno-linker-warnings")
 PTX = ("--target=nvptx64-nvidia-nvcl", "-Xclang", "-target-cpu", "-Xclang", "sm_80", "-Xclang", "-target-feature",
@@ -32,6 +40,11 @@ AMD_FIGURES = {
     "waves": r"Occupancy \[waves/SIMD\]", "spilled scalars": "SGPRs Spill", "spills": "VGPRs Spill",
     "local memory": r"LDS Size \[bytes/block\]",
 }  # fmt: skip
+
+
+def targets_of(file: str) -> tuple[str, ...]:
+    """Targets for which a file of kernels/ is compiled."""
+    return (*TARGETS, *MORE) if file in IMAGES else TARGETS
 
 
 class DoesNotCompile(Exception):
@@ -77,14 +90,17 @@ def compiled(variant: Variant, folder: Path, text: str | None = None) -> dict[st
     text = source(variant.file) if text is None else text
     macros = [f"-D{k}={v}" for k, v in variant.macros]
     out: dict[str, dict[str, dict[str, int] | str]] = {}
+    cards = [target for target in targets_of(variant.file) if target not in AMD]
+    bound = dict(variant.macros).get("REGISTERS", 0)
     try:
         ptx = nvidia_ptx(text, macros, folder)
+        _require_groups(ptx, text, dict(variant.macros))
     except DoesNotCompile as exc:
-        out |= {target: {"error": str(exc)} for target in NVIDIA}
+        out |= {target: {"error": str(exc)} for target in cards}
     else:
-        for target in NVIDIA:
+        for target in cards:
             try:
-                out[target] = nvidia(ptx, target, folder)
+                out[target] = nvidia(ptx, target, folder, bound)
             except DoesNotCompile as exc:
                 out[target] = {"error": str(exc)}
     for target in AMD:
@@ -103,10 +119,24 @@ def nvidia_ptx(text: str, macros: list[str], folder: Path) -> Path:
     return ptx
 
 
-def nvidia(ptx: Path, target: str, folder: Path) -> dict[str, dict[str, int]]:
-    """{kernel: registers, bytes of spills, stack, local memory} as ptxas says; its machine code is in `folder`."""
-    cubin = folder / f"{target}.cubin"
-    words = called([tool("ptxas"), f"-arch={target}", "-v", "-O3", str(ptx), "-o", str(cubin)])
+def _require_groups(ptx: Path, text: str, macros: dict[str, int]) -> None:
+    """Write the size of groups that a kernel requires into its PTX, as NVIDIA's OpenCL does and clang does not.
+
+    ptxas then gives a work-item of 256 at most 128 registers, so that two groups fit a multiprocessor.
+    """
+    required = re.search(r"reqd_work_group_size\((\w+), 1, 1\)", text)
+    if required and not macros.get("REGISTERS"):
+        items = macros.get(required[1]) or int(required[1])
+        ptx.write_text(re.sub(r"(\.entry \w+\([^)]*\))", rf"\1\n.reqntid {items}, 1, 1", ptx.read_text()))
+
+
+def nvidia(ptx: Path, target: str, folder: Path, bound: int = 0) -> dict[str, dict[str, int]]:
+    """{kernel: registers, bytes of spills, stack, local memory} as ptxas says; its machine code is in `folder`.
+
+    bound  most registers of a work-item, which plans ask of the driver; 0: none
+    """
+    cubin, options = folder / f"{target}.cubin", [f"--maxrregcount={bound}"] if bound else []
+    words = called([tool("ptxas"), f"-arch={target}", "-v", "-O3", *options, str(ptx), "-o", str(cubin)])
     out = {}
     text = ptx.read_text()
     for name, stack, stores, loads, registers, rest in FOUND.findall(words):
@@ -122,9 +152,9 @@ def nvidia(ptx: Path, target: str, folder: Path) -> dict[str, dict[str, int]]:
 
 
 def listing(target: str, folder: Path) -> str:
-    """nvdisasm's listing of the machine code that `nvidia` left in `folder`."""
+    """nvdisasm's listing of the machine code that `nvidia` left in `folder`, with the words of each instruction."""
     return subprocess.run(
-        [tool("nvdisasm"), "-c", str(folder / f"{target}.cubin")], capture_output=True, text=True, check=True
+        [tool("nvdisasm"), "-c", "-hex", str(folder / f"{target}.cubin")], capture_output=True, text=True, check=True
     ).stdout
 
 
@@ -144,3 +174,16 @@ def amd(text: str, macros: list[str], target: str) -> dict[str, dict[str, int]]:
             for key, label in AMD_FIGURES.items()
         }
     return out
+
+
+def intel_refusal(variant: Variant) -> str:
+    """What ocloc says of a program that it does not build for Intel's Arc; "" where it builds."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "program.cl"
+        path.write_text(source(variant.file))
+        options = " ".join(["-cl-std=CL1.2", *(f"-D{k}={v}" for k, v in variant.macros)])
+        try:
+            called([OCLOC, "compile", "-file", str(path), "-device", INTEL, "-options", options, "-out_dir", folder])
+        except DoesNotCompile as exc:
+            return str(exc)
+    return ""

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import json
+import shutil
 import tempfile
 from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
@@ -13,13 +15,14 @@ from typing import Any
 
 import numpy as np
 import platformdirs
-from gpu_static import compilers, hot_loops, sass, tasks
+from gpu_static import compilers, cycles, hot_loops, sass, tasks
 from gpu_static.collect import PAPER, WITHOUT_FP64, Use, Variant, collected
 
 from sarcl.opencl.programs import source
 
 ROOT = Path(__file__).resolve().parents[2]
 PARTS = 3  # of the tasks of a GPU, each collected by a process
+KERNEL = "backproject_shared_lines"  # whose cycles are modelled
 COUNTED = "sm_90"  # the target whose machine code is counted
 # Figures of one kernel of a variant: {target: {figure: number}}, those that are not zero, or {target: {"error": words}}
 Figures = dict[str, dict[str, Any]]
@@ -125,6 +128,53 @@ def _counted(variant: Variant) -> dict[str, Figures]:
                         out[kernel][COUNTED]["both sides"] = round(found.each_at_most, 1)
                     out[kernel][COUNTED]["loads"] = round(found.by_kind.get("load global", 0) / found.contributions, 1)
     return out
+
+
+def models() -> dict[str, list[float]]:
+    """A model: {name of a program of `first`: groups on a multiprocessor of sm_90, contributions per second}."""
+    names = sorted({name for some in first().values() for name in some if (name.split()[0], KERNEL) in hot_loops.HOT})
+    texts = _text("compilers", "sass", "hot_loops", "occupancy", "cycles")
+    return {
+        name: kept(digest_of([*texts, name, source(name.split()[0])]), functools.partial(_modelled, name))
+        for name in names
+    }
+
+
+def _modelled(name: str) -> list[float]:
+    """As `models`, of one program."""
+    variant = Variant.named(name)
+    with tempfile.TemporaryDirectory() as scratch:
+        program, groups = cycles.compiled(variant, KERNEL, source(variant.file), Path(scratch))
+    return [groups, cycles.rate(program, hot_loops.HOT[variant.file, KERNEL], dict(variant.macros), groups)]
+
+
+def intel(digests: dict[str, str], record: dict[str, Any]) -> tuple[int, list[str]]:
+    """Number of the programs without float64 that Intel's compiler, which is installed, builds; its refusals in words.
+
+    Those with a digest of the record are not built again where Intel's compiler built the record's programs.
+    """
+    tool = str(Path(str(shutil.which(compilers.OCLOC))).resolve().stat().st_mtime_ns)
+    known = record.get("digests", {}) if record.get("intel") else {}
+    chosen = [v for v in map(Variant.named, digests) if not _wide(v)]
+
+    def one(variant: Variant) -> str:
+        if known.get(variant.name) == digests[variant.name]:
+            return ""
+        return str(kept(digest_of([tool, digests[variant.name]]), lambda: compilers.intel_refusal(variant)))
+
+    with ThreadPoolExecutor() as pool:
+        said = list(pool.map(one, chosen))
+    refused = [
+        f"{variant.name} on Intel's {compilers.INTEL} cannot be compiled: {words}"
+        for variant, words in zip(chosen, said, strict=True) if words
+    ]  # fmt: skip
+    return len(chosen) - len(refused), refused
+
+
+def _wide(variant: Variant) -> bool:
+    """Whether a program computes in float64."""
+    macros = dict(variant.macros)
+    return bool(macros["FP64"]) if "FP64" in macros else "double" in source(variant.file)
 
 
 def figures(progress: Callable[[int, int], None], record: dict[str, Any]) -> tuple[dict[str, Any], dict[str, str]]:

@@ -6,9 +6,10 @@ from collections import defaultdict
 from typing import Any
 
 from gpu_static import occupancy, wavefronts
+from gpu_static.compilers import AMD
 from gpu_static.figures import COUNTED, ROOT
 from gpu_static.hot_loops import HOT
-from gpu_static.ratchet import MAY_SPILL, NOT_ON_GPUS
+from gpu_static.ratchet import MAY_BE_ALONE, MAY_SPILL, NOT_ON_GPUS
 
 PAGE = ROOT / "docs" / "developers" / "gpu_static.md"
 VARIANTS = ROOT / "tests" / "gpu_static" / "variants.md"  # a table per kernel, too long for a page of the docs
@@ -64,8 +65,9 @@ def _first(record: dict[str, Any]) -> list[str]:
         "Instructions are those of this program for pairs that lie inside of windows, then with both sides of every "
         "branch, then with the records of tiles and pulses, which other programs make.\n",
         "| tolerance | program | instructions | both sides | with records | loads | wavefronts of 32 pairs, range "
-        "along a line of pixels / across | ceiling by instructions with records, inferred | by wavefronts, inferred |",
-        "|---|---|---|---|---|---|---|---|---|",
+        "along a line of pixels / across | ceiling by instructions with records, inferred | by wavefronts, inferred "
+        "| model of cycles (groups) |",
+        "|---|---|---|---|---|---|---|---|---|---|",
     ]
     rows = [(task.split()[1], name) for task, names in record["first"].items() for name in names]
     for tolerance, (wanted, _) in GATHER.items():
@@ -84,9 +86,16 @@ def _first(record: dict[str, Any]) -> list[str]:
         whole = each + _of_records(record, file, macros)
         out.append(
             f"| {tolerance} | {file}, {chosen} | {each:g} | {here.get('both sides', each):g} | {whole:.1f} | "
-            f"{here['loads']:g} | {words} | {LANE_INSTRUCTIONS / whole / 1e9:.0f} | {ceilings} |"
+            f"{here['loads']:g} | {words} | {LANE_INSTRUCTIONS / whole / 1e9:.0f} | {ceilings} | "
+            f"{_modelled(record, name)} |"
         )
     return [*out, ""]
+
+
+def _modelled(record: dict[str, Any], name: str) -> str:
+    """The model's 10^9 contributions per second, and groups on a multiprocessor; "" for a program without."""
+    groups, rate = record["models"].get(name, (0, 0.0))
+    return f"{rate / 1e9:.0f} ({groups:.0f})" if rate else ""
 
 
 def _of_records(record: dict[str, Any], file: str, macros: dict[str, str]) -> float:
@@ -123,6 +132,9 @@ def _left_out() -> list[str]:
     """Programs that no GPU runs."""
     found = [f"- `{file}` is not compiled: {reason}." for file, reason in sorted(NOT_ON_GPUS.items())]
     found += [f"- `{file}` spills registers: {reason}." for file, reason in sorted(MAY_SPILL.items())]
+    found += [
+        f"- One group of `{file}` fits a multiprocessor: {reason}." for file, reason in sorted(MAY_BE_ALONE.items())
+    ]
     return ["## Known exceptions\n", "No other kernel spills, and none has a stack.\n", *found, ""]
 
 
@@ -136,7 +148,8 @@ def _files(record: dict[str, Any]) -> list[str]:
         "# Every kernel and variant\n",
         "Written by `make gpu-static ARGS=--record`; "
         "[how it is counted](../../docs/developers/gpu_static.md#how-instructions-are-counted).\n",
-        "Registers of sm_80 / sm_90; vector registers and waves per SIMD of gfx90a / gfx1100. Local memory, B per "
+        "Registers of sm_80 / sm_90, for images also of sm_89 and sm_120 behind them; "
+        "vector registers and waves per SIMD of gfx90a / gfx1100. Local memory, B per "
         "group, and occupancy are those of sm_90, the latter for groups as launched, or of 256 where the driver "
         "chooses. "
         "Instructions and loads from global memory are counted in the hot loop on sm_90.\n",
@@ -156,12 +169,13 @@ def _files(record: dict[str, Any]) -> list[str]:
         ]
         for name in names:
             n = record["figures"][name][kernel]
-            old, new, red, blue = (n[t] for t in ("sm_80", "sm_90", "gfx90a", "gfx1100"))
+            new, red, blue = (n[t] for t in ("sm_90", "gfx90a", "gfx1100"))
+            cards = " / ".join(str(n[t].get("registers", 0)) for t in n if t not in ("group", *AMD))
             share = occupancy.nvidia("sm_90", new.get("registers", 0), new.get("local memory", 0), n["group"])
             amd = " / ".join(str(t.get("registers", 0) + t.get("accumulators", 0)) for t in (red, blue))
             out.append(
                 f"| {', '.join(str(macros[name].get(k)) for k in differ) or 'one'} | "
-                f"{old.get('registers', 0)} / {new.get('registers', 0)} | {new.get('local memory', 0)} | "
+                f"{cards} | {new.get('local memory', 0)} | "
                 f"{share:.0%} | {new.get('instructions', 0):g} | {new.get('loads', 0):g} | {amd} | "
                 f"{red.get('waves', 0)} / {blue.get('waves', 0)} |"
             )

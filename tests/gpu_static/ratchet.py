@@ -6,7 +6,8 @@ import json
 from pathlib import Path
 from typing import Any
 
-from gpu_static.compilers import TARGETS
+from gpu_static import occupancy
+from gpu_static.compilers import AMD, IMAGES, targets_of
 from gpu_static.figures import COUNTED, ROOT
 
 RECORD = Path(__file__).with_name("figures.json")
@@ -14,6 +15,7 @@ REMEDY = (
     "Make the kernel cheaper; or, if it is worth this, record it with `make gpu-static ARGS=--record` and say why in "
     "the commit"
 )
+LEAST_GROUPS = 2  # per multiprocessor of NVIDIA, of kernels that make images: one computes while the other waits
 MOST_LOCAL = 48 * 1024  # bytes of local memory per work-group that every GPU has
 # Programs that no plan for a GPU builds, and why.
 NOT_ON_GPUS = {
@@ -23,6 +25,13 @@ NOT_ON_GPUS = {
 # kernels that may spill, as much as is recorded and no more, and why that costs little
 MAY_SPILL = {
     "row_gradients_float64.cl": "with gains of antennas; 20 spills are few beside 3300 instructions a pulse and point",
+    "backproject_shared_lines.cl": "within the registers that let two groups fit a multiprocessor; on an H100 5 % "
+    "faster than one group without spills",
+}
+# Programs for images, of which one group fits a multiprocessor, and why: file and some of their macros.
+MAY_BE_ALONE = {
+    "backproject.cl RANGE=3 TAPS=6": "132 and 134 registers on sm_80 and sm_89",
+    "backproject_float64.cl GAINS=2": "gradients with gains of antennas, 3355 instructions a pulse and pixel",
 }
 RATCHETED = {"registers": "registers", "accumulators": "registers", "spills": "bytes or registers that spill",
              "stack": "bytes of stack", "local memory": "bytes of local memory",
@@ -32,7 +41,8 @@ Record = dict[str, Any]
 
 
 def recorded() -> Record:
-    """{"tools": versions, "digests": {variant: text}, "figures": {variant: {kernel: figures}}}, as committed."""
+    """As committed: {"tools": versions, "intel": number of programs that Intel's compiler built, "digests": {variant:
+    text}, "figures": {variant: {kernel: figures}}}."""
     found: Record = json.loads(RECORD.read_text())
     return found
 
@@ -41,6 +51,7 @@ def text_of(record: Record) -> str:
     """JSON of a record: a line per target of each kernel."""
     lines = ["{", f' "tools": {json.dumps(record["tools"])},',
              f' "first": {json.dumps(record["first"])},',
+             *(f' "{key}": {json.dumps(record[key])},' for key in ("intel", "models")),
              ' "digests": {', ",\n".join(f"  {json.dumps(k)}: {json.dumps(v)}" for k, v in record["digests"].items()),
              " },", ' "figures": {']  # fmt: skip
     for i, (variant, kernels) in enumerate(record["figures"].items()):
@@ -53,11 +64,12 @@ def text_of(record: Record) -> str:
 
 
 def limits(found: dict[str, Any]) -> list[str]:
-    """Sentences on kernels that do not compile, spill, use a stack or take more local memory than every GPU has."""
+    """Sentences on kernels that do not compile, spill, use a stack, take more local memory than every GPU has, or make
+    images in groups of which fewer than LEAST_GROUPS fit a multiprocessor."""
     out = []
     for variant, kernels in found.items():
         for kernel, numbers in kernels.items():
-            for target in TARGETS:
+            for target in targets_of(variant.split()[0]):
                 here = numbers[target]
                 where = f"{variant}: kernel {kernel} on {target}"
                 if "error" in here:
@@ -74,7 +86,20 @@ def limits(found: dict[str, Any]) -> list[str]:
                         f"{where}: {here['local memory']} bytes of local memory, wanted at most {MOST_LOCAL}. "
                         "Make the tile or the group smaller"
                     )
+                if target not in AMD and _alone(variant, target, here, numbers["group"]):
+                    out.append(
+                        f"{where}: one group on a multiprocessor, wanted {LEAST_GROUPS}. Take fewer registers or less "
+                        "local memory, or give a reason in tests/gpu_static/ratchet.py:MAY_BE_ALONE"
+                    )
     return out
+
+
+def _alone(variant: str, target: str, here: dict[str, int], group: int) -> bool:
+    """Whether too few groups of a kernel that makes images fit a multiprocessor, for no reason that is known."""
+    file = variant.split()[0]
+    fits = occupancy.groups(target, here.get("registers", 0), here.get("local memory", 0), group)
+    known = any(set(some.split()) <= set(variant.split()) for some in MAY_BE_ALONE)
+    return file in IMAGES and not known and fits < LEAST_GROUPS
 
 
 def coverage(found: dict[str, Any]) -> list[str]:
@@ -103,7 +128,7 @@ def worse(found: dict[str, Any], before: dict[str, Any]) -> tuple[list[str], lis
             if not alike:
                 above.append(f"{variant}: kernel {kernel} has no recorded figures. {REMEDY}")
                 continue
-            for target in TARGETS:
+            for target in targets_of(variant.split()[0]):
                 for name, words in RATCHETED.items():
                     got = numbers[target].get(name, 0)
                     wanted = max(other.get(target, {}).get(name, 0) for other in alike)

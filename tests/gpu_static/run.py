@@ -5,6 +5,7 @@
     python tests/gpu_static/run.py --all       compile every program
     python tests/gpu_static/run.py --record    the same, and write figures.json, variants.md and the tables of the page
     python tests/gpu_static/run.py --count FILE [MACRO=VALUE ...]    count one program: figures of every target, loops
+    python tests/gpu_static/run.py --model     the model of cycles beside rates measured on an H100: its errors
     options: --text PATH (source text to compile in place of kernels/FILE), --keep FOLDER (PTX, cubin, listing)
 
 docs/developers/gpu_static.md says what is counted, and how.
@@ -13,6 +14,7 @@ docs/developers/gpu_static.md says what is counted, and how.
 from __future__ import annotations
 
 import argparse
+import shutil
 import sys
 import tempfile
 import time
@@ -21,7 +23,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "bench")]
 
-from gpu_static import compilers, figures, hot_loops, page, ratchet, sass  # noqa: E402
+from gpu_static import calibration, compilers, figures, hot_loops, page, ratchet, sass  # noqa: E402
 from gpu_static.collect import Variant, kernels_in  # noqa: E402
 
 from sarcl.opencl.programs import source  # noqa: E402
@@ -38,7 +40,7 @@ def count(file: str, macros: list[str], text: str, folder: Path) -> int:
     (folder / "sm_90.sass").write_text(listing)
     for kernel in kernels_in(text):
         print(kernel)
-        for target in compilers.TARGETS:
+        for target in compilers.targets_of(file):
             if target not in refused:
                 print(f"  {target}: " + ", ".join(f"{name} {value}" for name, value in figures[target][kernel].items()))
         if not listing:
@@ -69,9 +71,20 @@ def compare(record: bool, everything: bool) -> int:
     before = ratchet.recorded() if ratchet.RECORD.exists() else {"tools": {}, "figures": {}}
     found, digests = figures.figures(progress, {"figures": {}} if record or everything else before)
     wrong = ratchet.limits(found) + ratchet.coverage(found)
+    built, words = 0, "ocloc is not installed, nothing was compiled for it"
+    if shutil.which(compilers.OCLOC):
+        built, refused = figures.intel(digests, {} if record or everything else before)
+        wrong, words = wrong + refused, f"{built} programs built for {compilers.INTEL}"
     below: list[str] = []
     if record:
-        now = {"tools": compilers.versions(), "first": figures.first(), "digests": digests, "figures": found}
+        now = {
+            "tools": compilers.versions(),
+            "first": figures.first(),
+            "intel": built,
+            "models": figures.models(),
+            "digests": digests,
+            "figures": found,
+        }
         ratchet.RECORD.write_text(ratchet.text_of(now))
         page.PAGE.write_text(page.written(page.PAGE.read_text(), now))
         page.VARIANTS.write_text(page.variants(now))
@@ -87,8 +100,10 @@ def compare(record: bool, everything: bool) -> int:
         print(f"{len(below)} figures are below the recorded ones, such as\n{below[0]}\nKeep what is won: "
               "make gpu-static ARGS=--record")  # fmt: skip
     kernels = sum(map(len, found.values()))
-    print(f"{len(found)} programs, {kernels} kernels for {', '.join(compilers.TARGETS)}: {len(wrong)} findings, "
-          f"{time.monotonic() - start:.0f} s. Intel: no compiler without a device in the registries")  # fmt: skip
+    print(
+        f"{len(found)} programs, {kernels} kernels for {', '.join(compilers.TARGETS)}, for images also "
+        f"{', '.join(compilers.MORE)}: {len(wrong)} findings, {time.monotonic() - start:.0f} s. Intel: {words}"
+    )
     return 1 if wrong else 0
 
 
@@ -96,6 +111,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--record", action="store_true", help="write figures.json, variants.md and the page's tables")
     parser.add_argument("--all", action="store_true", help="compile also what has not changed since it was recorded")
+    parser.add_argument("--model", action="store_true", help="the model of cycles beside rates measured on an H100")
     parser.add_argument("--count", nargs="+", metavar=("FILE", "MACRO=VALUE"), help="count one program")
     parser.add_argument("--text", type=Path, help="source text to compile in place of kernels/FILE, #include expanded")
     parser.add_argument("--keep", type=Path, help="folder for PTX, machine code and nvdisasm's listing")
@@ -105,6 +121,9 @@ def main() -> int:
     except FileNotFoundError as exc:
         print(exc, file=sys.stderr)
         return 2
+    if args.model:
+        calibration.shown()
+        return 0
     if not args.count:
         return compare(args.record, args.all)
     file, *macros = args.count

@@ -16,6 +16,7 @@ import output_hashes
 
 import sarcl
 from sarcl import shapes
+from sarcl.bench import spaceborne as setting
 from sarcl.opencl.choose_device import open_device
 from sarcl.visibility.rays import SceneRays
 
@@ -44,15 +45,9 @@ def spaceborne(tolerance: float, listed: bool = False) -> Any:
 
     listed  the middle 2048 x 2048 pixels alone, as listed points, which lines cannot hold
     """
-    rows, samples = 11566, 8192
-    along = (np.arange(rows) - rows / 2) * 1.5
-    tx = np.stack([np.full(rows, 770e3 * 0.6), along, np.full(rows, 770e3 * 0.8)], axis=1)
-    noise = np.random.default_rng(1).standard_normal(2 * samples).astype(np.float32).view(np.complex64)
-    raw = sarcl.PhaseHistory(
-        np.broadcast_to(noise, (rows, samples)), frequency=9.65e9 - 300e6, frequency_step=600e6 / samples, tx=tx,
-        reference_range=np.linalg.norm(tx, axis=1),
-    )  # fmt: skip
-    grid = sarcl.ImageGrid.plane(shape=(8192, 8192), spacing=0.25)
+    noise = np.random.default_rng(1).standard_normal(2 * setting.SIDE).astype(np.float32).view(np.complex64)
+    raw = setting.phase_history(np.broadcast_to(noise, (setting.PULSES, setting.SIDE)))
+    grid = sarcl.ImageGrid.plane(shape=(setting.SIDE, setting.SIDE), spacing=setting.SPACING)
     if listed:
         grid = sarcl.ImageGrid.points(grid.part(slice(3072, 5120), slice(3072, 5120)).positions)
     return sarcl.backproject(raw, grid, tolerance=tolerance, method="direct", check=False, max_bytes=2e9)

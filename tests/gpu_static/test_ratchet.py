@@ -8,7 +8,9 @@ import pytest
 from gpu_static import compilers, occupancy, page, ratchet
 from gpu_static import figures as figures_of
 from gpu_static.collect import Use, Variant
-from gpu_static.compilers import TARGETS
+from gpu_static.compilers import MORE, TARGETS
+
+MOST_TARGETS = (*TARGETS, *MORE)
 
 
 @pytest.fixture
@@ -60,6 +62,18 @@ def test_what_no_gpu_should_run_is_named(figures, figure, words):
     assert said.startswith("a.cl FP64=1 TAPS=2: kernel sum on gfx90a") and words in said
 
 
+def test_kernels_for_images_fit_a_multiprocessor_twice_or_have_a_reason(figures):
+    plenty = {"registers": 129}  # two groups of 256 work-items have 128 registers each
+    found = {"nufft2d.cl FP64=1": {"sum": {"group": 256, **{target: {"registers": 64} for target in MOST_TARGETS}}}}
+    assert not ratchet.limits(found)
+    found["nufft2d.cl FP64=1"]["sum"]["sm_120"] = plenty
+    (said,) = ratchet.limits(found)
+    assert "nufft2d.cl FP64=1: kernel sum on sm_120: one group on a multiprocessor, wanted 2" in said
+    assert not ratchet.limits({"spread_points.cl VW=1": found["nufft2d.cl FP64=1"]})  # no image
+    alone = next(iter(ratchet.MAY_BE_ALONE))
+    assert not ratchet.limits({f"{alone} VW=1": found["nufft2d.cl FP64=1"]})
+
+
 def test_kernels_that_may_spill_have_no_stack_and_spill_no_more_than_recorded(figures):
     (file, *_) = ratchet.MAY_SPILL
     sums = figures["a.cl FP64=1 TAPS=2"]
@@ -97,6 +111,34 @@ def test_the_record_is_json_and_is_what_the_page_shows():
 def test_occupancy_follows_registers_local_memory_and_groups(registers, local, group, share):
     """Values of NVIDIA's occupancy calculator for compute capability 9.0."""
     assert occupancy.nvidia("sm_90", registers, local, group) == share
+
+
+@pytest.mark.parametrize("target, most", [("sm_80", 32), ("sm_89", 24), ("sm_90", 32), ("sm_120", 24)])
+def test_groups_of_a_warp_are_as_many_as_the_hardware_counts(target, most):
+    assert occupancy.groups(target, 16, 0, 32) == most and occupancy.groups(target, 128, 0, 256) == 2
+    assert occupancy.groups(target, 16, 99 * 1024, 32) == {"sm_90": 2}.get(target, 1)
+
+
+def test_sizes_of_groups_that_a_kernel_requires_are_in_its_ptx(tmp_path):
+    ptx = tmp_path / "all.ptx"
+    text, kernel = "__kernel __attribute__((reqd_work_group_size(ITEMS, 1, 1)))", ".entry sum(\n\t.param .u64 x\n)\n{"
+    for bound, wanted in ((0, kernel.replace("\n{", "\n.reqntid 64, 1, 1\n{")), (128, kernel)):
+        ptx.write_text(kernel)
+        compilers._require_groups(ptx, text, {"ITEMS": 64, "REGISTERS": bound})
+        assert ptx.read_text() == wanted
+
+
+def test_what_intels_compiler_refuses_is_named(monkeypatch, tmp_path):
+    names = ("merge_subapertures.cl FP64=0", "merge_subapertures.cl FP64=1", "backproject_float64.cl VW=1")
+    monkeypatch.setattr(compilers, "OCLOC", "python3")
+    monkeypatch.setattr(figures_of, "cache", lambda: tmp_path)
+    monkeypatch.setattr(compilers, "intel_refusal", lambda variant: built.append(variant.name) or "no such type")
+    built: list[str] = []
+    digests = dict.fromkeys(names, "1")
+    number, (said,) = figures_of.intel(digests, {})
+    assert number == 0 and "merge_subapertures.cl FP64=0 on Intel's dg2 cannot be compiled: no such type" in said
+    assert figures_of.intel(digests, {"intel": 1, "digests": digests}) == (1, [])
+    assert built == [names[0]]  # the others compute in float64
 
 
 def test_programs_recorded_from_the_same_text_are_not_compiled_again(monkeypatch, tmp_path):
