@@ -46,7 +46,7 @@ for each.
 SCALING = """One run at a tolerance of 1e-2; slopes through the logarithms of the larger three sizes.
 """
 MEMORY = """Backprojection from and to files within `max_bytes`. "Peak" is the largest resident memory above
-that of an idle process with an open device, kernels built before.
+that of the same process after a first small image, which loads code, driver and kernels.
 """
 ROOFLINE = """Operations per unit are counted in the source, a multiply-add as two; bytes are those that must come
 from memory or go there. Ceilings are those of two small kernels in the same run, per CPU second. Of
@@ -321,8 +321,8 @@ def memory(measured: dict[str, Row]) -> str:
 
 
 def peak(row: Row) -> float:
-    """MB above the idle process."""
-    return float(row["peak_above_idle_gib"]) * 2**30 / 1e6
+    """MB above the process after a small image."""
+    return float(row["peak_gib"]) * 2**30 / 1e6
 
 
 def reached(document: Row) -> list[tuple[Row, float, str]]:
