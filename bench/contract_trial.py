@@ -9,6 +9,8 @@ all of its errors are within the tolerance. Tasks without an exact result count 
 
 Echoes of points, channels and images are compared with the sums of sarcl/reference; echoes of facets and of antennas,
 and images of range-Doppler, at random samples by the verb's own check=True, which computes them again in float64.
+Full-wave echoes are compared with those of a run of the same grid at every pulse: their tolerance bounds what fewer
+runs change.
 
 Tasks that failed in an earlier run are tried again first, and those that are right now are listed as mended.
 The file is written after every STEP tasks, and a run continues where the file ends, so that it may be stopped at
@@ -36,6 +38,7 @@ from helpers import task_inputs as inputs  # noqa: E402
 from helpers.tasks import Draw  # noqa: E402
 
 import sarcl  # noqa: E402
+from sarcl.base.constants import SPEED_OF_LIGHT as C  # noqa: E402
 from sarcl.bench.documents import header  # noqa: E402
 from sarcl.opencl.choose_device import open_device  # noqa: E402
 from sarcl.reference.equations import excess_delay  # noqa: E402
@@ -85,6 +88,35 @@ def linear(draw: Draw) -> None:
     tasks.near(A.H @ y.ravel(), image, allowed, scale, "A.H y")
 
 
+def fullwave(draw: Draw) -> None:
+    """Waveform forming from few anchors against a run of the grid at every pulse, each to a tenth of the tolerance."""
+    center = draw.log(1e8, 1e11)
+    wavelength, n = C / center, draw.whole(4, 9)
+    size = wavelength * draw.random.uniform(0.15, 0.7, 3)
+    eps = draw.pick(None, None, None, 1.5 + 1.5 * draw.random.random())
+    material: Any = "metal" if eps is None else sarcl.Material(eps_r=eps)
+    scene = draw.pick(
+        sarcl.shapes.box(size, material=material),
+        sarcl.shapes.cylinder(size[0] / 2, size[1], material=material),
+        sarcl.shapes.sphere(size[0] / 2, facets=320, material=material),
+    )
+    bearing, arc = draw.random.uniform(0, 2 * np.pi), draw.log(3e-2, 3.0)
+    angles = bearing + arc * np.sort(draw.random.uniform(-0.5, 0.5, n))
+    distance, slope = wavelength * draw.log(5, 1e6), draw.random.uniform(-1.2, 1.2)
+    along = np.cos(slope) * np.stack([np.cos(angles), np.sin(angles)])
+    track = sarcl.Trajectory(np.arange(n) / 100, distance * np.stack([*along, np.full(n, np.sin(slope))], axis=1))
+    chirp = sarcl.Waveform.chirp(center=center, bandwidth=center * draw.log(1e-3, 0.2), duration=100 / center)
+    options: dict[str, Any] = {"cells": 8 * np.sqrt(eps or 1), "model_error": False}
+    options |= draw.pick({}, {"polarization": "VV"}, {"polarization": ("HH", "VH")})
+    allowed = draw.log(1e-3, 1e-1)
+    raw = sarcl.fullwave_echo(scene, chirp, track, tolerance=allowed, **options)
+    if len(raw.report.plan["anchors"]) == n:
+        return  # nothing was left out: nothing to compare
+    every = sarcl.fullwave_echo(scene, chirp, track, tolerance=allowed / 10, anchors=range(n), **options)
+    tasks.near(raw.samples[:], every.samples[:], allowed, what="echoes")
+    tasks.expect(raw.report.predicted_error <= allowed * (1 + 1e-9), "more is predicted than allowed")
+
+
 # Verb -> its kinds of tasks, which take turns
 VERBS: dict[str, tuple[Task, ...]] = {
     "echo": (echo_tasks.points, echo_tasks.facets, echo_tasks.channels),
@@ -93,6 +125,7 @@ VERBS: dict[str, tuple[Task, ...]] = {
     "polar_format": (image_tasks.polar_format,),
     "range_doppler": (image_tasks.range_doppler,),
     "linear.Echoes": (linear,),
+    "fullwave_echo": (fullwave,),
 }
 
 

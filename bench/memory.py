@@ -3,9 +3,11 @@
     python bench/memory.py [--pulses 2048] [--samples 4096] [--size 4096] [--max-bytes 5e8] [--compare]
     python bench/memory.py --series 1024 2048 4096 8192 --max-bytes 1e8 --pulses 512 --samples 1024 --json FILE
 
-Prints the peak resident memory above that of an idle process with an open device, in GiB; with --compare also the
-relative difference from the image made in one block. --series runs each size in a process of its own, after one
-that leaves its kernels in the driver's cache: a compiler takes memory too.
+Prints the peak resident memory in GiB above that of the same process after a first image of 256 x 256
+pixels: code, driver and kernels are loaded then. "code" is what these took, above an idle process with an open device.
+--in-memory makes the image an array, whose bytes are subtracted. With --compare also the relative difference from the
+image made in one block. --series runs each size in a process of its own, after one that leaves its kernels in the
+driver's cache: a compiler takes memory too.
 """
 
 from __future__ import annotations
@@ -35,6 +37,11 @@ def peak() -> float:
     """Largest resident memory so far, GiB; ru_maxrss would count a parent's before the fork."""
     line = next(t for t in Path("/proc/self/status").read_text().splitlines() if t.startswith("VmHWM"))
     return int(line.split()[1]) / 2**20
+
+
+def restart_peak() -> None:
+    """Let `peak` begin anew at what is resident now (Linux)."""
+    Path("/proc/self/clear_refs").write_text("5")
 
 
 def write_raw(path: Path, n_pulses: int, n_samples: int) -> sarcl.PhaseHistory:
@@ -83,6 +90,7 @@ def main() -> None:
     parser.add_argument("--size", type=int, default=4096)
     parser.add_argument("--tolerance", type=float, default=1e-2)
     parser.add_argument("--max-bytes", type=float)
+    parser.add_argument("--in-memory", action="store_true", help="the image in memory, not in a file")
     parser.add_argument("--compare", action="store_true", help="focus again in one block and compare")
     parser.add_argument("--series", type=int, nargs="+", help="sizes, each in a process of its own")
     parser.add_argument("--json", type=Path, help="file of the series")
@@ -95,11 +103,15 @@ def main() -> None:
         raw = write_raw(Path(folder, "raw.h5"), args.pulses, args.samples)
         grid = sarcl.ImageGrid.plane(shape=(args.size, args.size), spacing=0.02)
         options = {"tolerance": args.tolerance, "device": args.device, "check": False}
-        idle = resident()
-        image = sarcl.backproject(raw, grid, max_bytes=args.max_bytes, out=Path(folder, "image.h5"), **options)
+        idle, out = resident(), None if args.in_memory else Path(folder, "image.h5")
+        small = sarcl.ImageGrid.plane(shape=(256, 256), spacing=0.02 * args.size / 256)
+        sarcl.backproject(raw, small, max_bytes=args.max_bytes, out=Path(folder, "small.h5"), **options)
+        loaded = resident()
+        restart_peak()
+        image = sarcl.backproject(raw, grid, max_bytes=args.max_bytes, out=out, **options)
         result = {
-            "peak_above_idle_gib": peak() - idle,
-            "idle_gib": idle,
+            "peak_gib": peak() - loaded - (image.data.nbytes / 2**30 if args.in_memory else 0.0),
+            "code_gib": loaded - idle,
             "seconds": sum(image.report.seconds.values()),
             "contributions": image.report.contributions_done,
         }

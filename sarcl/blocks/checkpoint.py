@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
+from ..base import host_memory
 from ..base.types import PathLike
 from ..io import formats, output_paths
 from ..io.hdf5 import BLOCK_BYTES
@@ -104,7 +105,9 @@ class Checkpoint:
         try:
             tiles = self.tiles or self._open()
             for a, b, n in self._waiting:
-                tiles.save(a, b, _parts(flat, self.job.bands.extent(a, b), self._row_bytes), n)
+                rows = self.job.bands.extent(a, b)
+                host_memory.release(self._row_bytes * (rows.stop - rows.start))
+                tiles.save(a, b, _parts(flat, rows, self._row_bytes), n)
         except (OSError, TypeError) as exc:
             if self.resume:
                 raise

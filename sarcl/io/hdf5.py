@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from ..base.types import WritableArray
 
 FORMAT = 1  # version of sarcl's HDF5 file
-BLOCK_BYTES = 2**24  # bytes of a block of rows, about
+BLOCK_BYTES = 2**22  # bytes of a block of rows, about
 ATTRIBUTE_LETTERS = 2**12  # letters from which a text is a dataset: attributes end at 64 KB, of all of them together
 
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base import host_memory
 from ..base.text import first_line, size_text
 from ..base.threads import threads
 from ._host_arrays import HostArrays
@@ -170,6 +171,11 @@ class Device:
         self._check_size(nbytes)
         with explained(self.info, "a buffer", nbytes):
             return self._cl.Buffer(self.context, self._cl.mem_flags.READ_WRITE, nbytes)
+
+    def release(self, nbytes: float) -> None:
+        """Before blocks of so many bytes: on CPUs, what was freed goes back to the system (host_memory.release)."""
+        if self.is_cpu:
+            host_memory.release(nbytes)
 
     def write(self, buffer: Any, values: np.ndarray) -> None:
         """Copy `values` into a buffer, from its beginning on."""

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import ctypes
+import os
+import platform
 import shutil
 import tempfile
 from collections import namedtuple
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -37,3 +41,26 @@ def test_the_memory_of_this_machine_is_known_or_infinite(monkeypatch):
     assert host_memory.installed() > 2**28
     monkeypatch.delattr("os.sysconf", raising=False)
     assert host_memory.installed() == np.inf
+
+
+def resident():
+    """Resident bytes, whatever is free among them."""
+    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="other C libraries keep what they like")
+def test_freed_memory_between_arrays_in_use_goes_back_to_the_system():
+    arrays = [np.ones(12_000) for _ in range(1000)]  # 96 kB each: of the heap, never maps of their own
+    kept = arrays[::2]
+    del arrays
+    before = resident()
+    host_memory.release(host_memory.LEAST_RELEASED - 1)
+    assert resident() > before - 2**20
+    host_memory.release(host_memory.LEAST_RELEASED)
+    assert resident() < before - 500 * 80_000
+    assert all((array == 1).all() for array in kept)
+
+
+def test_other_c_libraries_have_nothing_to_release(monkeypatch):
+    monkeypatch.setattr(ctypes, "CDLL", lambda name: object())
+    host_memory.release(1e9)

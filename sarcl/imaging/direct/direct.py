@@ -140,7 +140,9 @@ class Direct(DirectEngine):
         most = min(self.profiles.most_rows(128, 4096), self.profiles.rows_in(for_rows))
         most = max(most, kernels.least_rows)
         rows = most // kernels.chunk * kernels.chunk or most // kernels.least_rows * kernels.least_rows
-        image = device.zeros(16 * tiles.n_tiles * tiles.per_tile)
+        nbytes = 16 * tiles.n_tiles * tiles.per_tile
+        device.release(nbytes)
+        image = device.zeros(nbytes)
         on = kernels.ready(tiles, self.task.skip_flags)
         second = self.antenna.second if self.antenna else 0
         apertures = self.taper.apertures(tiles.positions + self.tiling.center) if self.task.taper is not None else None

@@ -181,7 +181,9 @@ class Factorized(Engine):
     ) -> tuple[Buffer, np.ndarray]:
         """Sums of the leaves' pixels (4, pixels), on the device, and rows left out of each (2, n leaves)."""
         device, leaves, n_rows = self.device, tree.leaves, self.task.raw.n_rows
-        image = device.zeros(16 * leaves.n_tiles * self.tiling.per_tile)
+        nbytes = 16 * leaves.n_tiles * self.tiling.per_tile
+        device.release(nbytes)
+        image = device.zeros(nbytes)
         centers = [device.upload(float_pairs.wide(c.T)) for c in tree.centers]
         parents = [None, *(device.upload(p) for p in tree.parents)]
         down = _Descent(tree, image, centers, parents, self.leaves.ready(leaves, 0))

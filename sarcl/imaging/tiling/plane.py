@@ -115,6 +115,8 @@ class PlaneTiling(Tiling):
         if isinstance(flat, np.ndarray) and flat.dtype == np.complex64 and flat.flags.c_contiguous:
             if flat.shape[1] == columns:
                 out = flat[rows]
+        if out is None:
+            device.release(sums.size)
         values = np.empty((height, columns), np.complex64) if out is None else out
         image, slots = device.output(values), device.upload(tile_of_slot)
         numbers = {"pixels": n_tiles * self.per_tile, "across": self.across, "high": self.high, "wide": self.wide}
