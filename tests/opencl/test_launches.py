@@ -10,8 +10,9 @@ import pytest
 from helpers.cases import noise_history
 
 import sarcl
+from sarcl.imaging.tiling.tiling import download_sums
 from sarcl.opencl import _launches
-from sarcl.opencl._launches import FIRST, LASTS, Launches, fixed_axes
+from sarcl.opencl._launches import FIRST, LASTS, Launches, fixed_axes, in_groups
 from sarcl.opencl.choose_device import open_device
 from sarcl.opencl.device import Device
 
@@ -87,6 +88,20 @@ def test_groups_stay_whole_and_fixed_axes_are_not_cut():
         assert size[0] % 96 == 0 and size[1] == 3
     assert {size[1] for size, *_ in launched(gpu, Launches(), (2000, 30), fixed=frozenset({1}), steps=1e4)} == {30}
     assert len(launched(gpu, Launches(), (2000, 30), fixed=frozenset({0, 1}), steps=1e4)) == 1
+
+
+@pytest.mark.parametrize("n", [1487, 11195, 8423, 3863, 2 * 131071])
+def test_launches_that_no_warp_divides_are_whole_groups_and_a_rest(n):
+    (first, many), (rest, few) = in_groups((n, 3), None, frozenset())
+    assert (first, many + few, rest) == (0, n, many) and many % 256 == 0 and 0 < few < 256
+    for size, group, fixed in (((n, 3), (1, 1), ()), ((n,), None, (0,)), ((8192,), None, ()), ((227,), None, ())):
+        assert in_groups(size, group, frozenset(fixed)) == [(0, size[0])]
+
+
+def test_work_items_of_the_rest_count_on_from_the_whole_groups():
+    gpu, n = gpu_of(open_device("cpu")), 1487
+    sums = np.random.default_rng(0).standard_normal((4, n)).astype(np.float32)
+    assert np.array_equal(download_sums(gpu, gpu.copied(sums), n), (sums[0] + sums[2]) + 1j * (sums[1] + sums[3]))
 
 
 def test_axes_whose_size_a_kernel_asks_for_are_found():

@@ -16,7 +16,7 @@ import numpy as np
 from ...base import float_pairs
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.stage_timer import Clock
-from ...blocks.bands import FlatArray
+from ...blocks.bands import FlatArray, pages_in_use
 from ...opencl.device import Buffer, Device
 from ...opencl.launch_numbers import launch_numbers
 from ..direct.direct import Direct
@@ -169,7 +169,8 @@ class Factorized(Engine):
                 roots, coverage = section.roots, self._coverage(section.roots)
             assert coverage is not None
             tree, pixels = section.tree, section.tree.leaves.n_tiles * tiling.per_tile
-            image, missed = self._sums(tree, coverage.of(section.which), budget, clock, part_of(pixels))
+            with pages_in_use(self.device, flat, tiling.extent(*section.part[:2])):
+                image, missed = self._sums(tree, coverage.of(section.which), budget, clock, part_of(pixels))
             tiling.place_section(self.device, image, section, flat)
             skipped += Skipped.of_tiles(missed, section.sizes)
             done += pixels
