@@ -11,6 +11,7 @@ from helpers.cases import image_error, noise_history, noise_on, straight
 from helpers.devices import as_gpu
 
 import sarcl
+from sarcl.opencl.choose_device import open_device
 from sarcl.opencl.device import Device
 
 GRID = sarcl.ImageGrid.plane(center=(1, 2, 0), shape=(60, 50), spacing=(0.03, 0.02))
@@ -89,6 +90,15 @@ def test_subapertures_meet_their_tolerance(device):
     grid = sarcl.ImageGrid.plane(shape=(150, 170), spacing=0.25)
     image = sarcl.backproject(raw, grid, tolerance=1e-2, method="factorized", device=as_gpu(device), check=False)
     assert image_error(image, raw, most=150) <= image.report.predicted_error <= 1e-2
+
+
+def test_subapertures_of_rows_in_blocks_have_the_bits_of_one_block():
+    device, raw, grid = open_device("cpu"), noise_on(straight(300)), sarcl.ImageGrid.plane(shape=(90, 80), spacing=0.2)
+    gpus = as_gpu(device), as_gpu(device, upload=64 * 96 * 8)  # bytes of 64 rows
+    options = {"tolerance": 1e-2, "method": "factorized", "check": True}
+    first, second = (sarcl.backproject(raw, grid, device=gpu, **options) for gpu in gpus)
+    assert np.array_equal(first.data, second.data)
+    assert first.report.measured_error <= 1e-2
 
 
 def test_samples_too_large_for_the_sums_of_the_device_are_summed_on_the_host_or_refused(device):

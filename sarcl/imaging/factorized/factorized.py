@@ -29,6 +29,7 @@ from ._tile_coverage import TileCoverage, coverage_of, same_coverage, without
 from .plan import GUARD, FactorPlan, Level, moving_cost
 
 MERGE = "merge_subapertures.cl"
+WARP = 32  # work-items that a GPU works on together
 SPAN = 32  # vectors of a profile per work-item on CPUs; 1 on GPUs, where neighbouring work-items then read one line
 
 
@@ -322,7 +323,8 @@ class Factorized(Engine):
         return self._buffers[level, use][1]
 
     def _spans(self, level: int) -> int:
-        return -(-2 * self.strides[level] // (self._span * (8 if self.lanes > 1 else 2)))
+        spans = -(-2 * self.strides[level] // (self._span * (8 if self.lanes > 1 else 2)))
+        return -(-spans // WARP) * WARP if self.lanes == 1 and spans > 8 * WARP else spans  # groups are whole warps
 
     def _descend(
         self, down: _Descent, level: int, low: int, high: int, source: Buffer, first: int, within: float
