@@ -133,8 +133,7 @@ __kernel void merge(merge_numbers given, __global const float *restrict source, 
             STORE_CV(sums[0], out + first * row_size);
 #pragma unroll
             for (int a = 0; a < FILTER_TAPS - 1; a++) sums[a] = sums[a + 1];
-            int next = first + FILTER_TAPS;
-            sums[FILTER_TAPS - 1] = next < given.n_zeroed ? LOAD_CV(out + next * row_size) : (cv)0;
+            sums[FILTER_TAPS - 1] = 0;  // blocks are in order: none before these has added to it
         }
         __global const float *record = records + (size_t)block.x * N_SHIFT, *row = source + 2 * (size_t)block.x * given.stride;
         __global const float *weight = filter + (size_t)block.w * FILTER_TAPS;

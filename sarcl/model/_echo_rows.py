@@ -87,8 +87,10 @@ class EchoRows(NotebookTable):
         """Largest modulus of the real and imaginary parts of all samples; None where samples may change."""
         if not is_constant(self.samples):
             return None
-        parts = np.ascontiguousarray(self.samples).view(self.samples.real.dtype)
-        return max(float(parts.max()), -float(parts.min()))
+        step = max(1, 2**17 // self.n_samples)  # rows that a cache holds between the two searches
+        blocks = (np.ascontiguousarray(self.samples[at : at + step]) for at in range(0, self.n_rows, step))
+        parts = (block.view(block.real.dtype) for block in blocks)
+        return max(max(float(part.max()), -float(part.min())) for part in parts)
 
     def read(self, start: int, stop: int) -> np.ndarray:
         """Samples of rows start ... stop - 1 in memory; a NaN or Inf raises ValueError with its index."""

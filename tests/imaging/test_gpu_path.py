@@ -92,13 +92,11 @@ def test_subapertures_meet_their_tolerance(device):
     assert image_error(image, raw, most=150) <= image.report.predicted_error <= 1e-2
 
 
-def test_subapertures_of_rows_in_blocks_have_the_bits_of_one_block():
-    device, raw, grid = open_device("cpu"), noise_on(straight(300)), sarcl.ImageGrid.plane(shape=(90, 80), spacing=0.2)
-    gpus = as_gpu(device), as_gpu(device, upload=64 * 96 * 8)  # bytes of 64 rows
-    options = {"tolerance": 1e-2, "method": "factorized", "check": True}
-    first, second = (sarcl.backproject(raw, grid, device=gpu, **options) for gpu in gpus)
-    assert np.array_equal(first.data, second.data)
-    assert first.report.measured_error <= 1e-2
+def test_subapertures_add_up_the_blocks_of_rows():
+    raw, grid = noise_on(straight(600)), sarcl.ImageGrid.plane(shape=(40, 80), spacing=0.2)
+    device = as_gpu(open_device("cpu"))
+    image = sarcl.backproject(raw, grid, tolerance=1e-2, method="factorized", device=device, check=True)
+    assert image.report.measured_error <= image.report.predicted_error <= 1e-2
 
 
 def test_samples_too_large_for_the_sums_of_the_device_are_summed_on_the_host_or_refused(device):
