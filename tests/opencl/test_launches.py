@@ -10,7 +10,6 @@ import pytest
 from helpers.cases import noise_history
 
 import sarcl
-from sarcl.imaging.tiling.tiling import download_sums
 from sarcl.opencl import _launches
 from sarcl.opencl._launches import FIRST, LASTS, Launches, fixed_axes, in_groups
 from sarcl.opencl.choose_device import open_device
@@ -96,12 +95,6 @@ def test_launches_that_no_warp_divides_are_whole_groups_and_a_rest(n):
     assert (first, many + few, rest) == (0, n, many) and many % 256 == 0 and 0 < few < 256
     for size, group, fixed in (((n, 3), (1, 1), ()), ((n,), None, (0,)), ((8192,), None, ()), ((227,), None, ())):
         assert in_groups(size, group, frozenset(fixed)) == [(0, size[0])]
-
-
-def test_work_items_of_the_rest_count_on_from_the_whole_groups():
-    gpu, n = gpu_of(open_device("cpu")), 1487
-    sums = np.random.default_rng(0).standard_normal((4, n)).astype(np.float32)
-    assert np.array_equal(download_sums(gpu, gpu.copied(sums), n), (sums[0] + sums[2]) + 1j * (sums[1] + sums[3]))
 
 
 def test_axes_whose_size_a_kernel_asks_for_are_found():
