@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import mmap
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Protocol, Self
 
 import numpy as np
@@ -10,6 +13,8 @@ from numpy.typing import DTypeLike
 
 from ..base.stage_timer import Clock
 from ..opencl.device import Device
+
+LEAST_BYTES = 2**24  # of new rows whose memory a thread asks for: below, it takes longer to start one
 
 Run = tuple[int, int]  # bands first ... last - 1
 
@@ -20,6 +25,27 @@ class FlatArray(Protocol):
     def __getitem__(self, rows: slice, /) -> np.ndarray: ...
 
     def __setitem__(self, at: slice | tuple[slice, slice], block: np.ndarray, /) -> None: ...
+
+
+@contextmanager
+def pages_in_use(device: Device, flat: FlatArray, rows: slice) -> Iterator[None]:
+    """Context for the work of a GPU whose values go to some rows of a new array afterwards.
+
+    The system finds memory for a page when it is first used. A thread uses each page, so that the copy from the device
+    does not wait for them one after another.
+    """
+    thread = None
+    if isinstance(flat, np.ndarray) and not isinstance(flat, np.memmap) and not device.is_cpu:
+        block = flat[rows]
+        if block.flags.c_contiguous and block.nbytes >= LEAST_BYTES:
+            one_of_each = block.reshape(-1).view(np.uint8)[:: mmap.PAGESIZE]
+            thread = threading.Thread(target=np.bitwise_or, args=(one_of_each, 0, one_of_each))  # keeps every value
+            thread.start()
+    try:
+        yield
+    finally:
+        if thread:
+            thread.join()
 
 
 class Bands(Protocol):

@@ -5,12 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeAlias
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from ..base.errors import ToleranceUnreachable
+from ..base.fingerprint import checksum, leaves
 from ..base.report import ErrorTerm, terms_of_sum
 from ..base.tolerances import askable, reachable, rounded_up
+from ..model.lazy_rows import is_constant
+from ..model.phase_history import PhaseHistory
 from ..numerics import cost_model, error_bounds
 from ..numerics import plan as numerics_plan
 from ..numerics.cost_model import CPU, DeviceClass
@@ -32,6 +36,7 @@ from .tiling.tiling import Tiling
 
 METHODS = ("auto", "direct", "factorized")
 ROUNDING = 0.5  # largest share of a tolerance for each error that no plan makes smaller; the plan needs the rest
+MOST_CHOICES = 8  # that are kept for the same echoes
 STEP_OF_SEARCH = 2.0  # ratio of the tolerances that are tried for a refusal: plans of sub-apertures take long
 FLOAT64_SHARE = 1e-8  # error of gains in float64, over that in float32: 2^-29 by the digits, and a margin
 GAINS, SUMS = "float32 gains of the antenna", "rounding of float32 sums"
@@ -71,6 +76,8 @@ class MethodChoice:
         return self.engine(device, task, self.plan, self.tiling)
 
 
+_choices: WeakKeyDictionary[PhaseHistory, dict[tuple[object, ...], MethodChoice]] = WeakKeyDictionary()
+
 Planner: TypeAlias = Callable[[FocusingTask, float, DeviceClass], tuple[ImagePlan, Tiling]]
 Candidate: TypeAlias = (
     MethodChoice | ToleranceUnreachable
@@ -86,7 +93,37 @@ def choose(
     float64  the devices have float64, for tolerances that complex64 cannot meet
     ToleranceUnreachable names the best tolerance that can be met. ValueError for samples or paths with which no
     tolerance can.
+
+    The last choices for the same echoes are kept (`_conditions`).
     """
+    conditions = _conditions(task)
+    if conditions is None:
+        return _cheapest(task, method, tolerance, devices, float64)
+    known, key = _choices.setdefault(task.raw, {}), (conditions, method, tolerance, devices, float64)
+    chosen = known.pop(key, None) or _cheapest(task, method, tolerance, devices, float64)
+    known[key] = chosen  # the last one
+    if len(known) > MOST_CHOICES:
+        known.pop(next(iter(known)), None)
+    return chosen
+
+
+def _conditions(task: FocusingTask) -> str | None:
+    """Checksum of all that a choice follows from beside the samples; None where it cannot be kept.
+
+    That is where samples may change, where an option has no checksum, and for listed points, which take memory.
+    """
+    if not task.grid.is_plane or not is_constant(task.raw.samples):
+        return None
+    raw, fields = task.raw, (getattr(task, name) for name in task.__dataclass_fields__ if name != "raw")
+    rows = raw.frequency, raw.frequency_step, raw.time, raw.tx_channel, raw.rx_channel, raw.polarization
+    try:
+        return checksum(*rows, *(leaf for field in fields for leaf in leaves(field)))
+    except TypeError:
+        return None
+
+
+def _cheapest(task: FocusingTask, method: str, tolerance: float, devices: DeviceClass, float64: bool) -> MethodChoice:
+    """See `choose`."""
     if method == "factorized":
         if task.weighs_pixels:
             raise ValueError(

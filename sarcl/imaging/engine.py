@@ -173,7 +173,7 @@ class RowProfiles:
         """Buffer of the profiles (stop - start, stride) of rows start ... stop - 1."""
         along = self.task.row_weight[start:stop]
         samples = self.task.raw.read(start, stop)
-        if self._maker and self._maker.holds(samples, along):
+        if self._maker and self._maker.holds(samples, along, self.task.raw.largest_part):
             buffer, weights = self.pipeline.upload(samples), self.pipeline.upload(self._maker.weights(along))
             return self._maker.make(buffer, samples.dtype, weights, stop - start)
         weights = along[:, None] * self.sample_weight

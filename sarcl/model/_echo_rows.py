@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, cast
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from ..base import arguments, constants, validation
 from ..base.text import NotebookTable
 from ._row_fields import PER_ROW
-from .lazy_rows import pick
+from .lazy_rows import is_constant, pick
 
 if TYPE_CHECKING:
     from .phase_history import PhaseHistory
@@ -81,6 +82,16 @@ class EchoRows(NotebookTable):
         """Whether transmitter and receiver have equal positions in every row."""
         return self.rx is self.tx or np.array_equal(self.rx, self.tx)
 
+    @functools.cached_property
+    def largest_part(self) -> float | None:
+        """Largest modulus of the real and imaginary parts of all samples; None where samples may change."""
+        if not is_constant(self.samples):
+            return None
+        step = max(1, 2**17 // self.n_samples)  # rows that a cache holds between the two searches
+        blocks = (np.ascontiguousarray(self.samples[at : at + step]) for at in range(0, self.n_rows, step))
+        parts = (block.view(block.real.dtype) for block in blocks)
+        return max(max(float(part.max()), -float(part.min())) for part in parts)
+
     def read(self, start: int, stop: int) -> np.ndarray:
         """Samples of rows start ... stop - 1 in memory; a NaN or Inf raises ValueError with its index."""
         start, stop = validation.count("start", start, None), validation.count("stop", stop, None)
@@ -94,7 +105,8 @@ class EchoRows(NotebookTable):
                 f"samples[{start}:{stop}] gave shape {block.shape}, wanted {(stop - start, self.n_samples)}: "
                 "slices of its source do not agree with its shape"
             )
-        validation.finite("samples", block, first_row=start)
+        if not is_constant(self.samples):  # what cannot change was looked at when it was given
+            validation.finite("samples", block, first_row=start)
         return block if block.dtype.isnative else block.astype(block.dtype.newbyteorder("="))
 
     def __getitem__(self, rows: slice | Sequence[int] | np.ndarray) -> PhaseHistory:

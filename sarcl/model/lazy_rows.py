@@ -19,6 +19,15 @@ def in_memory(source: object) -> TypeGuard[np.ndarray]:
     return isinstance(source, np.ndarray) and not isinstance(source, np.memmap)
 
 
+def is_constant(source: object) -> bool:
+    """Whether nobody can write to `source`: a plain array that is read-only, as all are whose memory it shares."""
+    while in_memory(source) and not source.flags.writeable:
+        if source.base is None:
+            return True
+        source = source.base
+    return isinstance(source, bytes)
+
+
 def file_stamps(source: object) -> dict[str, tuple[int, int, int]]:
     """Inode, size and time of change of every file that a source reads its rows from, by its path."""
     if isinstance(source, RowsOnDemand):

@@ -67,13 +67,14 @@ class DeviceProfiles:
             rows = (nbytes - most * work) / self._row_bytes
         return int(rows)
 
-    def holds(self, samples: np.ndarray, row_weight: np.ndarray) -> bool:
+    def holds(self, samples: np.ndarray, row_weight: np.ndarray, largest: float | None = None) -> bool:
         """Whether the device can sum samples (n, n_samples), finite, with weights (n,): by their types and sizes.
 
+        largest  modulus of a real or imaginary part, where it is known
         A bound, several orders of magnitude below what the host can sum: what fails it, the host must do.
         """
         weights = float(np.abs(row_weight).max()), self._largest
-        return bound_of_held(self.device, samples, weights, self.n_samples, self.dtype) is not None
+        return bound_of_held(self.device, samples, weights, self.n_samples, self.dtype, largest) is not None
 
     def weights(self, row_weight: np.ndarray) -> np.ndarray:
         """Weights of rows (n,) as `make` takes them in a buffer."""

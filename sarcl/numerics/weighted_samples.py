@@ -23,11 +23,16 @@ PARTS = 32  # sums per row of `energy`, as in kernels/weighted_samples.cl
 
 
 def bound_of_held(
-    device: Device, samples: np.ndarray, weights: tuple[float, float], n: int, dtype: type[np.complexfloating]
+    device: Device,
+    samples: np.ndarray,
+    weights: tuple[float, float],
+    n: int,
+    dtype: type[np.complexfloating],
+    largest: float | None = None,
 ) -> float | None:
     """A modulus that no finite sample times its weights exceeds; None where a device may not sum n of them in `dtype`.
 
-    weights  largest of rows and of samples
+    weights  largest of rows and of samples;  largest  modulus of a real or imaginary part, where it is known
     The limit is several orders of magnitude below what the host can sum: what exceeds it, the host must do.
     """
     if samples.dtype == np.complex128:
@@ -37,9 +42,10 @@ def bound_of_held(
         return None
     if not all(w == 0 or 1 / WEIGHTS <= w <= WEIGHTS for w in weights):
         return None
-    parts = np.ascontiguousarray(samples).view(samples.real.dtype)
-    # no modulus exceeds the largest of real and imaginary parts by more than sqrt(2)
-    bound = 1.5 * max(float(parts.max()), -float(parts.min())) * weights[0] * weights[1]
+    if largest is None:
+        parts = np.ascontiguousarray(samples).view(samples.real.dtype)
+        largest = max(float(parts.max()), -float(parts.min()))
+    bound = 1.5 * largest * weights[0] * weights[1]  # no modulus exceeds the largest part by more than sqrt(2)
     return bound if bound * n <= LARGEST[dtype] / SPARE else None
 
 

@@ -7,6 +7,7 @@ are cut.
 
 from __future__ import annotations
 
+import functools
 import math
 import re
 import time
@@ -25,12 +26,32 @@ GROWTH = 8.0  # most times as many steps as in the largest part that was timed
 SHORT = 0.05  # of LASTS: a launch that takes less, and has been timed, is not timed again
 ALONG = 256  # parts along the first axis are multiples of so many work-items, where the driver chooses the groups
 
+WARP = 32  # work-items of a group that a GPU works on together
+
 Enqueue = Callable[[tuple[int, ...], tuple[int, ...] | None], Any]
 
 
 def fixed_axes(text: str) -> frozenset[int]:
     """Axes along which kernels of this source must not be cut: those whose size, or number of a group, they ask for."""
     return frozenset(int(n) for n in re.findall(r"\bget_(?:global_size|num_groups|group_id)\((\d)\)", text))
+
+
+def in_groups(size: tuple[int, ...], group: tuple[int, ...] | None, fixed: frozenset[int]) -> list[tuple[int, int]]:
+    """(first, count) of the work-items along the first axis that are launched together: all, or all but the last ones.
+
+    Groups that the driver chooses divide a launch: of a prime number of work-items each would be a group of its own,
+    and its loads would lie apart. So where no divisor fills a warp, whole groups come first.
+    """
+    end = size[0] % ALONG
+    if group or 0 in fixed or size[0] < ALONG or _divisor(size[0]) >= WARP:
+        end = 0
+    return [(0, size[0] - end), (size[0] - end, end)][: 1 + (end > 0)]
+
+
+@functools.lru_cache(maxsize=1024)
+def _divisor(n: int) -> int:
+    """The largest divisor of n up to ALONG."""
+    return next(d for d in range(ALONG, 0, -1) if n % d == 0)
 
 
 @dataclass

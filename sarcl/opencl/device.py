@@ -16,7 +16,7 @@ from ..base import host_memory
 from ..base.text import first_line, size_text
 from ..base.threads import threads
 from ._host_arrays import HostArrays
-from ._launches import Launches, fixed_axes
+from ._launches import Launches, fixed_axes, in_groups
 from .device_list import DeviceInfo
 from .failures import buffer_bytes, explained
 from .programs import build, kernels_of, names_in, quiet, source
@@ -257,11 +257,16 @@ class Device:
             need = size_text(buffer_bytes(arguments))
             self._last = f"kernel {kernel.function_name} or those before it, with buffers of {need},"
 
-            def enqueue(size: tuple[int, ...], offset: tuple[int, ...] | None) -> pyopencl.Event:
+            def enqueue(first: int, size: tuple[int, ...], offset: tuple[int, ...] | None) -> pyopencl.Event:
+                if first:
+                    at, *others = offset or (0,) * len(size)
+                    offset = (first + at, *others)
                 return kernel(self.queue, size, group, *arguments, global_offset=offset)
 
             fixed = self._fixed.get(kernel, frozenset(range(len(size))))
-            self._launches.launch(kernel, size, group, fixed, float(steps), enqueue, self.queue.flush)
+            for first, n in in_groups(size, group, fixed):
+                launched = kernel, (n, *size[1:]), group, fixed, float(steps), functools.partial(enqueue, first)
+                self._launches.launch(*launched, self.queue.flush)
 
     def finish(self) -> None:
         """Wait until everything enqueued is done."""

@@ -16,7 +16,8 @@ class Hot:
 
     contributions  of one trip of the loop, by one work-item: an expression
     unit           what a contribution is
-    loop           "innermost": the innermost loop with most instructions;  "barrier": the smallest loop with a barrier,
+    loop           "innermost": the innermost loop with most instructions;  "loads": that with most loads from global
+                   memory, where the compiler unrolls another one further;  "barrier": the smallest loop with a barrier,
                    through which the items of a work-group go together;  "around": the smallest loop around such a loop;
                    "kernel": all of it, each instruction once
     trips          trips of each loop inside the hot one, in order of addresses, loops inside these right after each:
@@ -86,7 +87,7 @@ HOT = {
     ("beam.cl", "times"): Hot("VW", "element and entry"),
     ("compression_filter.cl", "compress"): Hot("1", "sample of a Doppler bin", loop="kernel"),
     ("current_sums.cl", "current_sums"): Hot("8 * VW", "cell, frequency and pulse"),  # BLOCK in the kernel
-    ("merge_subapertures.cl", "merge"): Hot("1", "pulse and sample of a profile"),
+    ("merge_subapertures.cl", "merge"): Hot("1", "pulse and sample of a profile", loop="loads"),
     # a trip of a group's 64 items adds up to 64 samples: instructions of all items per sample
     ("nufft2d.cl", "spread"): Hot("1", "sample and tile of the grid", loop="barrier", trips=("64",)),
     ("range_doppler.cl", "straighten_onto"): Hot("1", "sample", loop="kernel"),
@@ -146,8 +147,10 @@ def hot_loop(code: Code, which: str) -> Loop | None:
     loops = code.every_loop()
     if which == "kernel":
         return Loop(0, len(code.opcodes) - 1, list(code.loops))
-    if which == "innermost":
+    if which in ("innermost", "loads"):
         loops = [loop for loop in loops if not loop.inside]
+        if which == "loads":
+            return max(loops, key=lambda loop: kinds(code.own(loop)).get("load global", 0), default=None)
     else:
         loops = [loop for loop in loops if any(code.opcodes[n].startswith("BAR") for n in range(loop.first, loop.last))]
         if which == "around":

@@ -11,6 +11,7 @@ from helpers.cases import image_error, noise_history, noise_on, straight
 from helpers.devices import as_gpu
 
 import sarcl
+from sarcl.opencl.choose_device import open_device
 from sarcl.opencl.device import Device
 
 GRID = sarcl.ImageGrid.plane(center=(1, 2, 0), shape=(60, 50), spacing=(0.03, 0.02))
@@ -89,6 +90,13 @@ def test_subapertures_meet_their_tolerance(device):
     grid = sarcl.ImageGrid.plane(shape=(150, 170), spacing=0.25)
     image = sarcl.backproject(raw, grid, tolerance=1e-2, method="factorized", device=as_gpu(device), check=False)
     assert image_error(image, raw, most=150) <= image.report.predicted_error <= 1e-2
+
+
+def test_subapertures_add_up_the_blocks_of_rows():
+    raw, grid = noise_on(straight(600)), sarcl.ImageGrid.plane(shape=(40, 80), spacing=0.2)
+    device = as_gpu(open_device("cpu"))
+    image = sarcl.backproject(raw, grid, tolerance=1e-2, method="factorized", device=device, check=True)
+    assert image.report.measured_error <= image.report.predicted_error <= 1e-2
 
 
 def test_samples_too_large_for_the_sums_of_the_device_are_summed_on_the_host_or_refused(device):

@@ -11,7 +11,7 @@ from helpers.cases import noise_history
 
 import sarcl
 from sarcl.opencl import _launches
-from sarcl.opencl._launches import FIRST, LASTS, Launches, fixed_axes
+from sarcl.opencl._launches import FIRST, LASTS, Launches, fixed_axes, in_groups
 from sarcl.opencl.choose_device import open_device
 from sarcl.opencl.device import Device
 
@@ -87,6 +87,14 @@ def test_groups_stay_whole_and_fixed_axes_are_not_cut():
         assert size[0] % 96 == 0 and size[1] == 3
     assert {size[1] for size, *_ in launched(gpu, Launches(), (2000, 30), fixed=frozenset({1}), steps=1e4)} == {30}
     assert len(launched(gpu, Launches(), (2000, 30), fixed=frozenset({0, 1}), steps=1e4)) == 1
+
+
+@pytest.mark.parametrize("n", [1487, 11195, 8423, 3863, 2 * 131071])
+def test_launches_that_no_warp_divides_are_whole_groups_and_a_rest(n):
+    (first, many), (rest, few) = in_groups((n, 3), None, frozenset())
+    assert (first, many + few, rest) == (0, n, many) and many % 256 == 0 and 0 < few < 256
+    for size, group, fixed in (((n, 3), (1, 1), ()), ((n,), None, (0,)), ((8192,), None, ()), ((227,), None, ())):
+        assert in_groups(size, group, frozenset(fixed)) == [(0, size[0])]
 
 
 def test_axes_whose_size_a_kernel_asks_for_are_found():

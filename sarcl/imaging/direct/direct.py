@@ -9,7 +9,7 @@ import numpy as np
 
 from ...base import text
 from ...base.stage_timer import Clock
-from ...blocks.bands import FlatArray
+from ...blocks.bands import FlatArray, pages_in_use
 from ...numerics import cost_model
 from ...numerics.cost_model import CPU, DeviceClass
 from ...numerics.plan import Plan, ProfileSums, cheapest
@@ -124,7 +124,8 @@ class Direct(DirectEngine):
                 on_progress((start * self.task.raw.n_rows + (stop - start) * rows) / tiles.n_tiles)
 
             part = tiles if stop - start == tiles.n_tiles else tiles.picked(np.arange(start, stop))
-            image, missed = self.add_up(part, budget, clock, rows_done)
+            with pages_in_use(self.device, flat, tiling.extent(first, last)):
+                image, missed = self.add_up(part, budget, clock, rows_done)
             tiling.place_sums(self.device, image, (first, last), (start, stop), orders, flat)
             skipped += Skipped.of_tiles(missed, tiling.tile_sizes(first, last)[start:stop])
         clock.lap("write")

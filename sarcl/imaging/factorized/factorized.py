@@ -16,7 +16,7 @@ import numpy as np
 from ...base import float_pairs
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.stage_timer import Clock
-from ...blocks.bands import FlatArray
+from ...blocks.bands import FlatArray, pages_in_use
 from ...opencl.device import Buffer, Device
 from ...opencl.launch_numbers import launch_numbers
 from ..direct.direct import Direct
@@ -29,6 +29,7 @@ from ._tile_coverage import TileCoverage, coverage_of, same_coverage, without
 from .plan import GUARD, FactorPlan, Level, moving_cost
 
 MERGE = "merge_subapertures.cl"
+WARP = 32  # work-items that a GPU works on together
 SPAN = 32  # vectors of a profile per work-item on CPUs; 1 on GPUs, where neighbouring work-items then read one line
 
 
@@ -169,7 +170,8 @@ class Factorized(Engine):
                 roots, coverage = section.roots, self._coverage(section.roots)
             assert coverage is not None
             tree, pixels = section.tree, section.tree.leaves.n_tiles * tiling.per_tile
-            image, missed = self._sums(tree, coverage.of(section.which), budget, clock, part_of(pixels))
+            with pages_in_use(self.device, flat, tiling.extent(*section.part[:2])):
+                image, missed = self._sums(tree, coverage.of(section.which), budget, clock, part_of(pixels))
             tiling.place_section(self.device, image, section, flat)
             skipped += Skipped.of_tiles(missed, section.sizes)
             done += pixels
@@ -323,7 +325,8 @@ class Factorized(Engine):
         return self._buffers[level, use][1]
 
     def _spans(self, level: int) -> int:
-        return -(-2 * self.strides[level] // (self._span * (8 if self.lanes > 1 else 2)))
+        spans = -(-2 * self.strides[level] // (self._span * (8 if self.lanes > 1 else 2)))
+        return -(-spans // WARP) * WARP if self.lanes == 1 and spans > 8 * WARP else spans  # groups are whole warps
 
     def _descend(
         self, down: _Descent, level: int, low: int, high: int, source: Buffer, first: int, within: float

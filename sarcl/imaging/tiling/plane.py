@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import itertools
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
@@ -65,10 +66,18 @@ class PlaneTiling(Tiling):
         return [(a, min(a + step, self.n_bands)) for a in range(0, self.n_bands, step)]
 
     def band(self, index: int) -> tuple[Tiles, np.ndarray | None]:
-        columns = np.arange(self.across) * self.wide + (self.wide - 1) / 2
-        row = index * self.high + (self.high - 1) / 2
-        references = self.grid.at(np.full(self.across, row), columns) - self.center
-        return Tiles(self.per_tile, references, np.full(self.across, self.radius), self._offsets, shared=True), None
+        return self.bands(index, index + 1)[0], None
+
+    def bands(self, first: int, last: int) -> tuple[Tiles, Orders]:
+        rows = np.arange(first, last) * self.high + self._reference(self.high)
+        columns = np.arange(self.across) * self.wide + self._reference(self.wide)
+        references = self.grid.at(rows[:, None], columns).reshape(-1, 3) - self.center
+        radius = np.full(len(references), self.radius)
+        return Tiles(self.per_tile, references, radius, self._offsets, shared=True), (None,) * len(rows)
+
+    def _reference(self, pixels: int) -> float:
+        """Place of a tile's reference along a side of so many pixels."""
+        return (pixels - 1) / 2
 
     def tile_sizes(self, first: int, last: int) -> np.ndarray:
         rows, columns = self.grid.shape
@@ -133,26 +142,17 @@ class PlaneTiling(Tiling):
     def tree(self, first: int, last: int, factors: Sequence[int]) -> Tree:
         """See Tiling. Tiles are cut from the whole grid, so that they do not depend on which bands are asked for."""
         down, right = (a.ravel() for a in np.meshgrid(np.arange(first, last), np.arange(self.across), indexing="ij"))
-        keys: list[np.ndarray] = []
-        for factor in factors:
-            keys += [down // factor, right // factor]
-        order = np.lexsort(keys[::-1])
-        centers, children = [], []
-        starts_below = np.arange(len(order) + 1)
-        for level in range(len(factors) - 1, -1, -1):
-            factor = factors[level]
-            cells = np.stack([k[order] for k in keys[: 2 * level + 2]])
-            new = np.ones(len(order), bool)
-            new[1:] = (cells[:, 1:] != cells[:, :-1]).any(axis=0)
-            at = np.flatnonzero(new)
-            centers.append(self._center_of(down[order][at] // factor, right[order][at] // factor, factor))
-            starts = np.append(at, len(order))
-            if level < len(factors) - 1:
-                children.append(np.searchsorted(starts_below, starts))
-            starts_below = starts
+        cells = [down // factor * (self.across + 1) + right // factor for factor in factors]
+        order, starts = np.lexsort(cells[::-1]), []
+        is_first = np.arange(len(order)) == 0  # of the leaves of a tile
+        for cell in cells:
+            is_first[1:] |= np.diff(cell[order]) != 0
+            starts.append(np.append(np.flatnonzero(is_first), len(order)))
         leaves = self.bands(first, last)[0].picked(order)
-        centers[0] = leaves.references
-        return Tree(tuple(centers[::-1]), tuple(children[::-1]), leaves, order)
+        corners = [(factor, order[at[:-1]]) for factor, at in zip(factors[:-1], starts, strict=False)]
+        centers = [self._center_of(down[at] // factor, right[at] // factor, factor) for factor, at in corners]
+        children = [np.searchsorted(below, at) for at, below in itertools.pairwise(starts)]
+        return Tree((*centers, leaves.references), tuple(children), leaves, order)
 
     def _center_of(self, down: np.ndarray, right: np.ndarray, factor: int) -> np.ndarray:
         """Centres, m about the scene's centre (n, 3), of tiles of `factor` leaves per side."""
@@ -246,11 +246,7 @@ class LineTiling(PlaneTiling):
     def __init__(self, grid: ImageGrid, side: int) -> None:
         super().__init__(grid, side)
         self._cut(side, side)
-        self.radius = side / 2 * self.pixel
+        self.radius, self._offsets = side / 2 * self.pixel, np.zeros((6, 0), np.float32)
 
-    def band(self, index: int) -> tuple[Tiles, np.ndarray | None]:
-        half = self.side // 2
-        columns = np.arange(self.across) * self.side + half
-        references = self.grid.at(np.full(self.across, index * self.side + half), columns) - self.center
-        radius = np.full(self.across, self.radius)
-        return Tiles(self.per_tile, references, radius, np.zeros((6, 0), np.float32), shared=True), None
+    def _reference(self, pixels: int) -> float:
+        return pixels // 2
