@@ -20,7 +20,11 @@ import numpy as np
 from ..base.constants import SPEED_OF_LIGHT
 from ..base.rows import spread_over
 from ..base.vectors import unit
+from ..opencl.device import Device
+from ..scene.scene import Scene
+from ..scene.terrain import Heights, above, is_overlooked
 from ..scene.triangles import areas, bisect, centroids, cut, edges, normals
+from ..visibility.lit_parts import ground_of
 from ..visibility.rays import SceneRays
 from . import facet_kinds
 from ._facet_norm import (
@@ -83,12 +87,12 @@ class CuttingError:
         self._errors: dict[float, float] = {}
 
     @cached_property
-    def _rays(self) -> SceneRays | None:
-        """Rays by which facets shade one another, None where all of them are seen whole."""
+    def _casters(self) -> _Casters | None:
+        """What shades facets, None where all of them are seen whole."""
         view = self._view
         if view.shades is None or view.antennas.forward or len(view.scene.triangles) < 2:
             return None
-        return SceneRays(view.shades, view.scene.triangles)
+        return _Casters.of(view.scene, view.antennas.ends, view.shades)
 
     def _sees(self, places: np.ndarray, facets: np.ndarray, ends: Ends) -> np.ndarray:
         """Whether antennas at `ends` see places, m (n, 3), on facets (n,) past others, from a side that reflects."""
@@ -96,7 +100,7 @@ class CuttingError:
         n, to_tx, to_rx = normals(scene.triangles[facets]), unit(ends[0] - places), unit(ends[1] - places)
         behind = scene.two_sided[facets] & turned(n, to_tx, to_rx, self._forward)
         seen = lit_share(np.where(behind[:, None], -n, n), to_tx, to_rx, self._forward) > 0
-        return seen if self._rays is None else seen & ~_hidden(self._rays, places, facets, ends)
+        return seen if self._casters is None else seen & ~self._casters.hide(places, facets, ends)
 
     def gain(self, edge: float) -> float:
         """Norm of facets cut to `edge`, m (inf: not at all), over that of the facets as they are given, those of one
@@ -192,7 +196,7 @@ class CuttingError:
         parts = [(pieces, np.zeros(len(pieces)))]
         parts += [(one, path_beyond(ends, places, centroids(one) - places)) for one in finer]
         seen = _Seen([(one, *self._scattering(one, of, ends), path) for one, path in parts])
-        return seen if self._rays is None else seen.shaded(self._rays, self._numbers[of], ends)
+        return seen if self._casters is None else seen.shaded(self._casters, self._numbers[of], ends)
 
     def _scattering(self, triangles: np.ndarray, of: np.ndarray, ends: Ends) -> tuple[np.ndarray, np.ndarray]:
         """S times the reflectivity, complex128 (n, n polarisations), and u_t + u_r (n, 3)."""
@@ -221,10 +225,10 @@ class _Seen:
     parts: list[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]
     lit: list[np.ndarray] | None = None
 
-    def shaded(self, rays: SceneRays, facet: np.ndarray, ends: Ends) -> _Seen:
+    def shaded(self, casters: _Casters, facet: np.ndarray, ends: Ends) -> _Seen:
         """The same with what antennas at `ends` see past others of the scene's facets; facet  of each piece (n,)."""
         places = [centroids(triangles) for triangles, *_ in self.parts[1:]]
-        return replace(self, lit=[~_hidden(rays, one, facet, ends) for one in places])
+        return replace(self, lit=[~casters.hide(one, facet, ends) for one in places])
 
     def echoes(self, k: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """S I of the pieces with linear phase, about their centroids, complex128 (n, n polarisations), and the same as
@@ -244,7 +248,31 @@ class _Seen:
         return matrix * np.where(partly[:, None], linear, echo), finer
 
 
-def _hidden(rays: SceneRays, places: np.ndarray, facets: np.ndarray, ends: Ends) -> np.ndarray:
-    """Whether other facets hide places, m (n, 3), on facets (n,), from one of both antennas."""
-    ways = ends[:1] if np.array_equal(*ends) else ends
-    return np.any([rays.any_hit(places, np.tile(end, (len(places), 1)), leaving=facets) for end in ways], axis=0)
+@dataclass(frozen=True, eq=False)
+class _Casters:
+    """Facets of a scene that cast shadows: rays that meet them, and their numbers among these (k,), -1: none.
+
+    heights  terrain that is not among them, None: it is, or there is none. Lines of sight that climb more steeply than
+             it does are hidden by it where they begin below it
+    """
+
+    rays: SceneRays
+    numbers: np.ndarray
+    heights: Heights | None
+
+    @classmethod
+    def of(cls, scene: Scene, ends: Sequence[np.ndarray], device: Device) -> _Casters:
+        """Those of a scene, seen from antennas, m (n_pulses, 3) each."""
+        ground, heights = ground_of(scene, list(ends)), scene.heights
+        rest = scene.triangles[~ground]
+        if heights is None or len(rest) == len(ground) or not is_overlooked(heights, scene.bounds, list(ends)):
+            return cls(SceneRays(device, scene.triangles), np.arange(len(ground)), None)
+        return cls(SceneRays(device, rest), np.where(ground, -1, np.cumsum(~ground) - 1), heights)
+
+    def hide(self, places: np.ndarray, facets: np.ndarray, ends: Ends) -> np.ndarray:
+        """Whether other facets hide places, m (n, 3), on facets (n,), from one of both antennas."""
+        ways, leaving = ends[:1] if np.array_equal(*ends) else ends, self.numbers[facets]
+        out = np.any([self.rays.any_hit(places, np.tile(e, (len(places), 1)), leaving=leaving) for e in ways], axis=0)
+        if self.heights is not None:
+            out |= above(self.heights, places) < -self.rays.least
+        return np.asarray(out)

@@ -14,7 +14,7 @@ from ..numerics.pulse_geometry import PulseGeometry
 from ..opencl.device import Device
 from ..scene import triangles as geometry
 from ..scene.scene import Scene
-from ..scene.terrain import Heights, clear_of, stand_above
+from ..scene.terrain import Heights, clear_of, is_overlooked, stand_above
 from ..visibility.illumination import Illumination, IlluminationTask, Occlusion, illuminated
 from ..visibility.lit_parts import ON_PLANE, FacetPieces, LitParts, ground_of, upper_sides
 from ..visibility.swept_shadows import far_slopes, never_shaded
@@ -65,17 +65,22 @@ def lit_parts_of(
 ) -> LitParts:
     """Lit parts of the pieces `wanted` (k,), which the facets that they are parts of occlude."""
     scene, given = pieces.scene, pieces.original.triangles
+    occluders = given
     # forward scatter passes through the ground's own body: all of its facets count
     ground = np.zeros(len(given), bool) if antennas.forward else ground_of(pieces.original, antennas.ends)
     upper = upper_sides(pieces.original, ground)
-    if ground.any() and pieces.original.heights is not None:
+    heights = pieces.original.heights
+    if ground.any() and heights is not None:
         is_other = np.zeros(len(given), bool)
         is_other[pieces.of[wanted]] = True
         others = np.flatnonzero(is_other & ~ground)
-        upper[others] = stand_above(pieces.original.heights, given[others])
+        upper[others] = stand_above(heights, given[others])
+        # lines of sight that climb more steeply than the terrain, from what stands above it, meet none of it
+        if upper[is_other].all() and not rule.margin and is_overlooked(heights, pieces.original.bounds, antennas.ends):
+            occluders, ground = given[~ground], ground[~ground]
     sides = scene.two_sided, wanted, given, pieces.of, ground, upper, antennas.forward
-    options = {"max_bytes": rule.max_bytes, "margin": rule.margin}
-    return LitParts(device, FacetPieces(scene.triangles, *sides), given, antennas.ends, progress=progress, **options)
+    parts, options = FacetPieces(scene.triangles, *sides), {"max_bytes": rule.max_bytes, "margin": rule.margin}
+    return LitParts(device, parts, occluders, antennas.ends, progress=progress, **options)
 
 
 def illumination_of(
@@ -225,6 +230,8 @@ class Casters:
 
 def rough_looks(scene: Scene, cell: float, n_pulses: int) -> float:
     """Pairs of a pulse and a piece of incoherent facets, cut to a cell's edge, m."""
-    rough = ~coherent(scene)
-    pieces = np.maximum(2 * geometry.areas(scene.triangles[rough]) / cell**2, 1.0)
-    return float(pieces.sum()) * n_pulses
+
+    def pieces() -> float:
+        return float(np.maximum(2 * geometry.areas(scene.triangles[~coherent(scene)]) / cell**2, 1.0).sum())
+
+    return scene.kept.of(("rough pieces", cell), pieces) * n_pulses

@@ -15,7 +15,7 @@ from ..numerics.pulse_geometry import PulseGeometry
 from ..opencl.device import Device
 from ..scene import triangles as geometry
 from ..scene.scene import Scene
-from ..scene.terrain import above, check_above, facets_on
+from ..scene.terrain import above, check_above
 from ..visibility.illumination import ALL_DARK, Illumination
 from ..visibility.lit_parts import LitParts
 from .facet_kinds import coherent
@@ -205,7 +205,7 @@ def check_antennas_above(scene: Scene, antennas: PulseGeometry) -> None:
     """ValueError for an antenna under a scene's terrain, where that is complete."""
     for name, positions in zip(("track", "receiver"), antennas.ends, strict=False):
         if scene.heights is not None and above(scene.heights, positions).min() < 0:
-            if facets_on(scene.heights, scene.triangles) is not None:
+            if scene.on_heights is not None:
                 check_above(name, scene.heights, positions)
 
 

@@ -377,6 +377,13 @@ class Scene(NotebookTable):
     realized, part, split = _changes.realized, _changes.part, _changes.split
     at_frequency = _changes.at_frequency
 
+    @property
+    def on_heights(self) -> NDArray[np.bool_] | None:
+        """True (k,) for facets that lie on the terrain; None without one, or where these are not all of it."""
+        if (heights := self.heights) is None:
+            return None
+        return self.kept.of("facets on heights", lambda: terrain.facets_on(heights, self.triangles))
+
     @cached_property
     def kept(self) -> Kept:
         """Results that follow from the scene alone, which calls of the verbs share; for the library's own use."""

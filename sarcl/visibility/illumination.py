@@ -32,7 +32,7 @@ from ._viewpoints import drawn_of
 
 # Looks that are taken in any case: shadows move by two COARSE widths of a facet at most from one to the next, so that
 # none crosses a facet unseen. Up to COARSEST times fewer where they were more looks at a facet than MUCH
-COARSE, COARSEST, MUCH = 1.0, 32, 3e6
+COARSE, COARSEST, MUCH = 1.0, 32, 1e6
 
 log = logging.getLogger(__name__)
 

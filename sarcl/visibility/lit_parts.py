@@ -14,7 +14,7 @@ from ..base.vectors import dot, rising, unit
 from ..opencl.choose_device import with_float64
 from ..opencl.device import Device
 from ..scene.scene import Scene
-from ..scene.terrain import above, facets_on
+from ..scene.terrain import above
 from ..scene.triangles import areas, normals
 from ._aspect_blocks import pulse_blocks, shadow_length
 from ._bodies import bodies_of
@@ -97,7 +97,7 @@ def ground_of(scene: Scene, ends: list[np.ndarray]) -> np.ndarray:
     antennas, m (n_pulses, 3) each."""
     on = None
     if scene.heights is not None and all(above(scene.heights, end).min() >= 0 for end in ends):
-        on = facets_on(scene.heights, scene.triangles)
+        on = scene.on_heights
     return np.zeros(len(scene.triangles), bool) if on is None else on
 
 

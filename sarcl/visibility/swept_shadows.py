@@ -50,10 +50,11 @@ def far_slopes(terrain: np.ndarray, ends: list[np.ndarray]) -> np.ndarray:
 
     A line of sight from a facet that faces an antenna runs over the terrain, and enters it through one of these alone.
     """
-    upward = np.sign(normals(terrain)[:, 2:])
+    normal = normals(terrain)
+    upward = np.sign(normal[:, 2:]) * normal
     is_far = np.zeros(len(terrain), bool)
     for end in ends:
-        is_far |= ~_face(terrain, upward * normals(terrain), box_about(end))
+        is_far |= ~_face(terrain, upward, box_about(end))
     return is_far
 
 

@@ -208,6 +208,22 @@ def test_a_bright_facet_in_shadow_hides_no_errors(angle):
     assert 1e-3 < achieved <= raw.report.predicted_error <= 1e-1
 
 
+@pytest.mark.parametrize("height", [-0.5, 0.5])
+def test_a_plate_under_a_terrain_counts_as_little_as_under_the_same_facets(device, height):
+    """What lies under a terrain below all lines of sight is hidden by its heights; under facets alone, by rays."""
+    axis, tx = np.linspace(-4, 4, 5), np.array([[30.0, 0, 60.0]])
+    ground = sarcl.Scene.from_heights(axis, axis, np.zeros((5, 5)), material=ROUGH)
+    large, small = (sarcl.shapes.plate((side, side)).moved((x, x, z)) for side, x, z in ((2, 0, height), (0.5, 2, 0.5)))
+    known = ground + large + small
+    bare = sarcl.Scene.facets(
+        known.triangles, two_sided=known.two_sided, material=known.material, materials=known.materials
+    )
+    assert known.heights is not None and bare.heights is None
+    views = [FacetView(scene, PulseGeometry(tx, tx), 9.6e9, 0.0, ("HH",), VERTICAL, device) for scene in (known, bare)]
+    one, other = ((error.gain(0.2), error.relative(0.02)) for error in map(CuttingError, views))
+    assert one == pytest.approx(other, rel=1e-6)
+
+
 # Directions -------------------------------------------------------------------------------------------------
 
 UP = np.array([0.0, 0.0, 1.0])

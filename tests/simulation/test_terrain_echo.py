@@ -131,6 +131,21 @@ def test_smooth_terrain_is_clipped_whether_its_heights_are_known_or_not(sampled)
         assert np.linalg.norm(known.samples - unknown.samples) <= bound * np.linalg.norm(unknown.samples)
 
 
+@pytest.mark.parametrize("height", [0.0, 2.0])
+def test_smooth_plates_beside_gentle_hills_are_shaded_alike_whether_heights_are_known_or_not(height):
+    """Upright ones, the second one behind the first: above the ground, which shades nothing, and half in it."""
+    upright = shapes.plate((2, 2), material="metal", two_sided=True).triangles[:, :, [2, 0, 1]]
+    places = np.array([(0.0, 0.5, height), (-3.0, 0.0, height)])
+    plates = sarcl.Scene.facets((places[:, None, None] + upright).reshape(-1, 3, 3))
+    scene = hills(n=12, height=0.05) + plates
+    known, bare = (sarcl.echo(s, WAVE, track(n=2), tolerance=1e-2, check=False) for s in (scene, without(scene)))
+    lit = sarcl.echo(scene, WAVE, track(n=2), tolerance=1e-2, check=False, shadows=False)
+    norm = np.linalg.norm(bare.samples)
+    assert (
+        np.linalg.norm(known.samples - bare.samples) <= 1e-5 * norm < 0.1 * np.linalg.norm(lit.samples - bare.samples)
+    )
+
+
 def test_scenes_keep_heights_as_long_as_they_are_theirs():
     scene = hills(n=20)
     x, _, z = scene.heights

@@ -15,7 +15,6 @@ from ...base.errors import warn
 from ...base.stage_timer import Clock
 from ...numerics.polynomials import chebyshev, lagrange
 from ...scene.scene import Scene
-from ...scene.terrain import facets_on
 from ...scene.triangles import bisect, edges, solid
 from ..spreading import ChannelView, Counts
 from . import _sums
@@ -74,7 +73,7 @@ class BounceScene:
             return None
         ground, origin = None, box(scene.triangles[is_solid].reshape(-1, 3)).mean(axis=0)
         if scene.heights is not None and (~mirrors).sum() > MOST_SHADING:
-            on = facets_on(scene.heights, scene.triangles)
+            on = scene.on_heights
             if on is not None and not mirrors[on].any():
                 ground = Ground(scene.triangles[on & is_solid] - origin, scene.heights, origin)
                 is_solid &= ~on
