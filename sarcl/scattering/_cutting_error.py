@@ -128,8 +128,15 @@ class CuttingError:
         if edge not in self._measured:
             n = float(np.maximum(1.0, 1.5 * (self._length / edge) ** 2).sum()) * len(self._ends)
             frequencies = min(FREQUENCIES, int(MEASURED / n))
-            self._measured[edge] = self._measure(edge, frequencies) if frequencies >= FEWEST_FREQUENCIES else None
+            self._measured[edge] = self._fallen(edge, frequencies) if frequencies >= FEWEST_FREQUENCIES else None
         return self._measured[edge]
+
+    def _fallen(self, edge: float, frequencies: int) -> float | None:
+        """As `measured`: with shadows, whose edges are known by rays to the middles of parts alone, the errors of one
+        length may cancel by chance. Errors fall with the square of the edge, and no more is trusted there."""
+        error, coarser = self._measure(edge, frequencies), min((one for one in self._measured if one > edge), default=0)
+        before = self._measured.get(coarser) if self._rays is not None else None
+        return error if error is None or before is None else max(error, before * (edge / coarser) ** 2)
 
     def _measure(self, edge: float, frequencies: int) -> float | None:
         parts, of = cut(self._triangles, longest_piece(edge), MEASURED)
