@@ -133,7 +133,7 @@ class CuttingError:
         return self._measured[edge]
 
     def _fallen(self, edge: float, frequencies: int) -> float | None:
-        """As `measured`: where edges of shadows, known by rays to the middles of parts alone, cross pieces, the errors of
+        """As `measured`: where edges of shadows, known by rays to middles of parts alone, cross pieces, the errors of
         one length may cancel by chance. They fall with the square of the edge, and no more is trusted."""
         error, coarser = self._measure(edge, frequencies), min((one for one in self._measured if one > edge), default=0)
         before = self._measured.get(coarser) if self._clips else None
