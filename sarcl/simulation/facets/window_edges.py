@@ -22,6 +22,7 @@ from functools import partial
 import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
+from ...base.morton import morton_order
 from ...base.stage_timer import Clock
 from ...base.vectors import unit
 from ...numerics.polynomials import chebyshev, lagrange
@@ -42,7 +43,8 @@ class WindowEdges:
     def __init__(self, facets: FacetSet, view: ChannelView) -> None:
         """facets  as the channel's pulses see them"""
         self.facets, self.view = facets, view
-        self._rows = np.flatnonzero(~facets.is_incoherent)
+        rows = np.flatnonzero(~facets.is_incoherent)
+        self._rows = rows[morton_order(centroids(facets.triangles[rows]))]  # neighbours follow one another
         triangles = facets.triangles[self._rows]
         self._places = centroids(triangles)
         self._reach = np.sqrt(((triangles - self._places[:, None]) ** 2).sum(axis=2).max(axis=1))
