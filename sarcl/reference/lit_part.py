@@ -1,4 +1,4 @@
-"""The part of a facet that is in no shadow: every occluder, every edge, in float64."""
+"""The part of a facet that is in no shadow, and in a range window: every occluder, every edge, in float64."""
 
 from __future__ import annotations
 
@@ -99,6 +99,20 @@ def _halves(piece: np.ndarray, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray
     return np.array(right).reshape(-1, 2), np.array(left).reshape(-1, 2)
 
 
+def _beyond(piece: np.ndarray, along: np.ndarray, limit: float) -> np.ndarray:
+    """The part of a convex polygon (n, 2) where along.rho is at least `limit`."""
+    if not np.isfinite(limit):
+        return piece
+    rest = []
+    for a, b in zip(piece, np.roll(piece, -1, axis=0), strict=True):
+        above, next_above = along @ a - limit, along @ b - limit
+        if above >= 0:
+            rest.append(a)
+        if above * next_above < 0:
+            rest.append(a + above / (above - next_above) * (b - a))
+    return np.array(rest).reshape(-1, 2)
+
+
 def lit_part(
     facet: np.ndarray,
     occluders: np.ndarray,
@@ -106,13 +120,15 @@ def lit_part(
     waves: np.ndarray,
     on_plane: float = 1e-9,
     others: np.ndarray | None = None,
+    *,
+    window: tuple[float, float] = (-np.inf, np.inf),
 ) -> tuple[float, np.ndarray]:
     """Share of a facet, m (3, 3), that one antenna or two, m (3,), see past occluders, m (k, 3, 3), and the mean over
     the whole facet of exp(j k (u_t + u_r).rho) on that part, rho from the centroid, at wavenumbers k, rad/m: (m,).
 
     An antenna that is edge-on to the facet, or behind the side that both look at, casts no shadow. Of forward scatter,
     `others`, bool (k,), are occluders of other bodies: these alone cast shadows from the second antenna, which looks at
-    the facet from any side."""
+    the facet from any side. `window`, m: only the part with (u_t + u_r).rho between these counts."""
     up = plane_axes(facet)[2]
     sines = [float(unit(antenna - facet.mean(axis=0)) @ up) for antenna in antennas]
     side = -1.0 if sum(sines) < 0 else 1.0
@@ -131,6 +147,8 @@ def lit_part(
     total = float(np.linalg.norm(np.cross(facet[1] - facet[0], facet[2] - facet[0]))) / 2
     share, mean = 0.0, np.zeros(len(waves), np.complex128)
     for piece in pieces:
+        for limit, side in zip(window, (1.0, -1.0), strict=True):
+            piece = _beyond(piece, side * both, side * limit)
         for i in range(1, len(piece) - 1):
             corners = piece[[0, i, i + 1]]
             phases = np.outer(waves, corners @ both)

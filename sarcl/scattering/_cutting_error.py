@@ -84,6 +84,7 @@ class CuttingError:
         self._error_ends = [*self._ends, *steep]
         self._phase: float | None = None
         self._measured: dict[float, float | None] = {}
+        self._clips = False  # whether antennas have been found to see a part of some piece
         self._errors: dict[float, float] = {}
 
     @cached_property
@@ -132,8 +133,15 @@ class CuttingError:
         if edge not in self._measured:
             n = float(np.maximum(1.0, 1.5 * (self._length / edge) ** 2).sum()) * len(self._ends)
             frequencies = min(FREQUENCIES, int(MEASURED / n))
-            self._measured[edge] = self._measure(edge, frequencies) if frequencies >= FEWEST_FREQUENCIES else None
+            self._measured[edge] = self._fallen(edge, frequencies) if frequencies >= FEWEST_FREQUENCIES else None
         return self._measured[edge]
+
+    def _fallen(self, edge: float, frequencies: int) -> float | None:
+        """As `measured`: where edges of shadows, known by rays to middles of parts alone, cross pieces, the errors of
+        one length may cancel by chance. They fall with the square of the edge, and no more is trusted."""
+        error, coarser = self._measure(edge, frequencies), min((one for one in self._measured if one > edge), default=0)
+        before = self._measured.get(coarser) if self._clips else None
+        return error if error is None or before is None else max(error, before * (edge / coarser) ** 2)
 
     def _measure(self, edge: float, frequencies: int) -> float | None:
         parts, of = cut(self._triangles, longest_piece(edge), MEASURED)
@@ -144,6 +152,7 @@ class CuttingError:
         wrong, right = np.zeros(()), np.zeros(())
         for ends in self._ends:
             seen, path = self._seen(parts, of, ends, 4), path_beyond(ends, middle, places - middle)
+            self._clips |= seen.is_clipped
             between = path_beyond(ends, first[:1], first - first[:1])
             for waves in self._waves.T[:: -(-FREQUENCIES // frequencies)]:
                 k = waves[plane]
@@ -224,6 +233,11 @@ class _Seen:
 
     parts: list[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]
     lit: list[np.ndarray] | None = None
+
+    @property
+    def is_clipped(self) -> bool:
+        """Whether antennas see a part of some piece."""
+        return self.lit is not None and bool((np.any(self.lit, axis=0) & ~np.all(self.lit, axis=0)).any())
 
     def shaded(self, casters: _Casters, facet: np.ndarray, ends: Ends) -> _Seen:
         """The same with what antennas at `ends` see past others of the scene's facets; facet  of each piece (n,)."""

@@ -133,7 +133,8 @@ class EchoPlan:
         """Fields of the PhaseHistory; n_kept  pulses that files of earlier runs held."""
         channels, options, clock = self.channels, self.task.options, filler.clock
         measured = None
-        if worth_checking(prepared, options.check, channels.overlap):
+        crossed = added.counts.crossed / max(len(output), 1)
+        if worth_checking(prepared, options.check, channels.overlap, crossed):
             measured = channels.measured(prepared, output)
             clock.lap("check")
         plan = channels.words(planned.method, added.plan)  # type: ignore[arg-type]

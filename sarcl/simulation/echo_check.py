@@ -12,6 +12,7 @@ from ..numerics.pulse_geometry import PulseGeometry
 from ..scattering.antenna_weights import AntennaWeights
 from ..scattering.facets import FacetSet, Light
 from ..scattering.scatterers import Points
+from ..scene.triangles import centroids
 from .bounces.bounce_spreader import BounceScene, BounceSpreader
 from .edges.edge_echoes import EdgeEchoes
 from .facets.exact_facets import facet_samples, inside_window
@@ -54,11 +55,14 @@ def seconds_to_check(scene: SceneEchoes) -> float:
     return MOST_DRAWS**2 * points * per_point + draws**2 * facets * PER_FACET + draws * partly * PER_LIT_PART
 
 
-def worth_checking(scene: SceneEchoes, check: bool | None, channels: float = 1) -> bool:
-    """Whether samples are to be recomputed: as asked, or where that takes less than 2 % of the time."""
+def worth_checking(scene: SceneEchoes, check: bool | None, channels: float = 1, crossed: float = 0) -> bool:
+    """Whether samples are to be recomputed: as asked, or where that takes less than 2 % of the time.
+
+    crossed  facets on which the range window of a pulse ends"""
     if check is not None:
         return check
-    return channels * seconds_to_check(scene) < 0.02 * scene.request.clock.seconds.get("echo", 0.0)
+    parts = draws_of(scene) * crossed * PER_LIT_PART
+    return channels * (seconds_to_check(scene) + parts) < 0.02 * scene.request.clock.seconds.get("echo", 0.0)
 
 
 def measure_error(
@@ -127,8 +131,13 @@ def _exact(part: Points | FacetSet, view: ChannelView, p: int) -> tuple[np.ndarr
     """Samples (n_polarizations, n) of pulse p at the frequencies, and their power at random phases."""
     antennas, frequencies, polarizations = view.antennas, view.frequencies, view.polarizations
     if isinstance(part, FacetSet):
+        crossed = np.zeros(len(part), bool) if not view.gated else across_edges(part, view, p)
         return facet_samples(
-            part, view, p, inside_window(part, antennas, p), exact_light(part, antennas, p, frequencies)
+            part,
+            view,
+            p,
+            inside_window(part, antennas, p) | crossed,
+            exact_light(part, antennas, p, frequencies, crossed),
         )
     from ..reference.equations import point_echo as exact_echo
 
@@ -173,17 +182,43 @@ def _bounced(scene: BounceScene, view: ChannelView, pulse: int) -> np.ndarray:
     return np.stack([sums[:, "HV".index(name[0]), "HV".index(name[1])] for name in view.polarizations])
 
 
-def exact_light(part: FacetSet, antennas: PulseGeometry, pulse: int, frequencies: np.ndarray) -> Light:
-    """What a pulse sees of the partly lit facets, by the reference."""
+def exact_light(
+    part: FacetSet, antennas: PulseGeometry, pulse: int, frequencies: np.ndarray, crossed: np.ndarray | None = None
+) -> Light:
+    """What a pulse sees of the partly lit facets, and within its range window of facets `crossed` by the window's edges
+    (k,) bool, by the reference."""
     from ..reference.lit_part import lit_part
 
-    if part.lit_parts is None or part.lit_rows is None:
+    rows = np.full(len(part), -1) if part.lit_parts is None or part.lit_rows is None else part.lit_rows
+    crossed = np.zeros(len(part), bool) if crossed is None else crossed
+    index, waves = np.flatnonzero((rows >= 0) | crossed), 2 * np.pi * frequencies / SPEED_OF_LIGHT
+    if not len(index):
         return Light.whole(1, len(frequencies))
-    index, waves = np.flatnonzero(part.lit_rows >= 0), 2 * np.pi * frequencies / SPEED_OF_LIGHT
-    ends = [end[pulse] for end in antennas.ends]
+    ends, on_plane, whole = [end[pulse] for end in antennas.ends], 1e-9, (-np.inf, np.inf)
     share, mean = np.empty((1, len(index))), np.empty((1, len(index), len(waves)), np.complex128)
-    for i, row in enumerate(part.lit_rows[index].tolist()):
-        occluders, others = part.lit_parts.occluders_at(pulse, row)
-        facet, on_plane = part.lit_parts.facet_at(row), part.lit_parts.on_plane
-        share[0, i], mean[0, i] = lit_part(facet, occluders, ends, waves, on_plane, others)
+    limits = part_limits(part.triangles[index], antennas, pulse)
+    for i, (row, cut, window) in enumerate(zip(rows[index].tolist(), crossed[index], limits.tolist(), strict=True)):
+        facet, occluders, others = part.triangles[index[i]], np.zeros((0, 3, 3)), None
+        if row >= 0 and part.lit_parts is not None:
+            occluders, others = part.lit_parts.occluders_at(pulse, row)
+            facet, on_plane = part.lit_parts.facet_at(row), part.lit_parts.on_plane
+        limit = (window[0], window[1]) if cut else whole
+        share[0, i], mean[0, i] = lit_part(facet, occluders, ends, waves, on_plane, others, window=limit)
     return Light(index, np.maximum(share, 0), mean)
+
+
+def part_limits(triangles: np.ndarray, antennas: PulseGeometry, pulse: int) -> np.ndarray:
+    """Limits of (u_t + u_r).rho, m, about the centroids of facets, within the range window of a pulse (k, 2)."""
+    half_path = sum(np.linalg.norm(end[pulse] - centroids(triangles), axis=1) for end in (antennas.tx, antennas.rx)) / 2
+    beyond = half_path - antennas.reference_range[pulse]
+    return np.stack([2 * (beyond - antennas.far[pulse]), 2 * (beyond - antennas.near[pulse])], axis=1)
+
+
+def across_edges(part: FacetSet, view: ChannelView, pulse: int) -> np.ndarray:
+    """Coherent facets (k,) bool that an edge of the range window of a pulse crosses."""
+    antennas, middle = view.antennas, centroids(part.triangles)[:, None]
+    half_path = sum(np.linalg.norm(end[pulse] - part.triangles, axis=2) for end in (antennas.tx, antennas.rx)) / 2
+    reach = np.linalg.norm(part.triangles - middle, axis=2).max(axis=1)
+    about = half_path.mean(axis=1) - antennas.reference_range[pulse]
+    near = [np.abs(about - limit[pulse]) < reach for limit in (antennas.near, antennas.far)]
+    return np.asarray((near[0] | near[1]) & ~part.is_incoherent)

@@ -26,13 +26,14 @@ from .facets.exact_facets import ExactFacets
 from .facets.facet_method import facet_echoes
 from .facets.facet_spreading import FacetSpreader, TiledFacets
 from .facets.facets_behind_sheets import FacetsBehindSheets, SheetEchoes
+from .facets.window_edges import WindowEdges
 from .factorized.spreader import FactorizedSpreader
 from .points.direct import PointSpreader
 from .points.point_plan import PointPlan, PreparedPoints
 from .scene_plan import NODES, model_words
 from .spreading import Band, ChannelView, Counts
 
-Spreader = FacetSpreader | ExactFacets | FactorizedSpreader | BounceSpreader | EdgeEchoes | SheetEchoes
+Spreader = FacetSpreader | ExactFacets | FactorizedSpreader | BounceSpreader | EdgeEchoes | SheetEchoes | WindowEdges
 UNKNOWN_SHADOWS = {"shadow edges": "sampled, not part of the error"}  # for the report
 
 
@@ -183,6 +184,7 @@ class SceneEchoes:
             raise NotApplicable(f'method="factorized" is not possible: {text}; pass method="auto"')
         if spread:  # relative to the norm of the facets that each adds: not more of all of them
             parts.append((ErrorTerm("facets", max(error for error, _ in spread), SMALLER_TOLERANCE), spread[0][1]))
+        spreaders += self.window_edges(view, first)
         if self.edges is not None:
             edges = EdgeEchoes(self.edges, view)
             spreaders.append(edges)
@@ -198,6 +200,13 @@ class SceneEchoes:
             words |= edges.describe()
             error_terms = *error_terms, ErrorTerm("edges", self.edges.error, SMALLER_TOLERANCE)
         return ChannelEchoes(self, points, tuple(spreaders), error_terms, words)
+
+    def window_edges(self, view: ChannelView, first: int = 0) -> list[WindowEdges]:
+        """Coherent facets where edges of the range window cross them."""
+        if not view.gated:
+            return []
+        parts = (part.within(first, first + len(view.antennas), self.n_pulses) for part in self.facets)
+        return [WindowEdges(part, view) for part in parts if part.is_mirror and not part.is_incoherent.all()]
 
     def _facets_on_host(
         self, view: ChannelView, first: int

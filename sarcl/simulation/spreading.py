@@ -45,6 +45,7 @@ class Counts:
     unseen          pairs of a beam and a facet that it does not reach, or that the receiver does not see
     weak            beams whose echoes together are weaker than a share of the tolerance
     orders          beams of 1, 2 ... reflections that contributed, where several are followed
+    crossed         pairs of a coherent facet and a pulse whose range window ends on it
     late, power     mean |sample|^2, less the pulse's spectrum, of beams outside the range window, and of all samples
     latest          m about the reference: the latest of such beams
     """
@@ -59,6 +60,7 @@ class Counts:
     late: float = 0.0
     power: float = 0.0
     latest: float = -math.inf
+    crossed: int = 0
 
     def __add__(self, other: Counts) -> Counts:
         return Counts(
@@ -72,6 +74,7 @@ class Counts:
             self.late + other.late,
             self.power + other.power,
             max(self.latest, other.latest),
+            self.crossed + other.crossed,
         )
 
     @property

@@ -63,7 +63,7 @@ class TrackOptions(RunOptions):
     range_window: ArrayLike | None = option(
         None,
         "(near, far) m about the reference, default the smallest that holds the scene plus 10 %; scatterers outside it "
-        "are left out, row by row",
+        "are left out, row by row, and of smooth facets the part outside",
     )
     reference: ArrayLike | None = option(
         None,

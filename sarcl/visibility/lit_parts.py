@@ -357,6 +357,28 @@ class LitParts:
             return self._occluders[some], None
         return self._occluders[some], bodies[some] != self._pieces.body[self._rows[row]]
 
+    def of_triangles(
+        self, pulse: int, rows: np.ndarray, triangles: np.ndarray, ends: list[np.ndarray], waves: np.ndarray
+    ) -> np.ndarray:
+        """Means over triangles, m (n, 3, 3), that lie in partly lit facets of these numbers (n,), as `at` has them of
+        whole facets: about their own centroids, complex64 (n, m).
+
+        ends  antennas of the pulse, m (3,), one or two
+        """
+        pulse += self._first
+        block = next(block for block in self._blocks if block.span.first <= pulse < block.span.stop)
+        pairs, places = self._pairs_of(block), self._rows[rows]
+        begin, end = (np.searchsorted(pairs[:, 0], places, side) for side in ("left", "right"))
+        index = [np.arange(a, b) for a, b in zip(begin.tolist(), end.tolist(), strict=True)]
+        own = np.repeat(np.arange(len(rows)), end - begin)
+        some = replace(self._pieces.part(places), index=np.arange(len(rows)), triangles=triangles)
+        of_own = np.stack([own, pairs[np.concatenate(index), 1]], axis=1) if len(own) else np.zeros((0, 2), pairs.dtype)
+        antennas = np.stack([one - self._origin for one in ends])[None]
+        mean = np.empty((len(rows), len(waves)), np.complex64)
+        for _, part, _, values in self._clipper.light(some, np.arange(len(rows)), of_own, antennas, waves):
+            mean[part] = values[0]
+        return mean
+
     def facet_at(self, row: int) -> np.ndarray:
         """Corners of partly lit facet number `row`, m (3, 3), not moved by random heights, which shift no shadow."""
         return np.asarray(self._pieces.triangles[self._rows[row]])

@@ -6,6 +6,7 @@ For other folders:
     facet_method          the method for a channel: factorised, directly, or both
     facet_spreading       facets to range profiles
     facets_behind_sheets  facets that are seen through thin sheets, added up in float64 on the host
+    window_edges          the parts of coherent facets at the edges of a range window, in float64 on the host
 
 For this folder alone:
 
