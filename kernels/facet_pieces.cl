@@ -1,4 +1,4 @@
-// Facets bisected at their longest edges until none is longer than a limit, and what spread_facets.cl reads of each piece:
+// Facets bisected at their longest edges until none is longer than a limit, and what facet_amplitudes.cl reads of each piece:
 // computed piece by piece from the given facets, in their order.
 //
 //   (a, b, c), a b the longest edge  ->  (a, m, c) and (m, b, c),   m = (a + b)/2
@@ -274,7 +274,7 @@ typedef struct {
 //   heights, real, imag   states from which the streams of random numbers start
 //   surfaces  the reflectivity and the four numbers of roughness, 1/sqrt(eps), and the rms of heights where there are any
 //   centers   float64 (3, stride), m
-//   planes    float32 (8 + n_surface - has_heights, stride): as spread_facets.cl reads them; edges 0 beyond the last piece
+//   planes    float32 (8 + n_surface - has_heights, stride): as facet_amplitudes.cl reads them; edges 0 beyond the last piece
 __kernel void place_pieces(place_pieces_numbers given, __global const double *restrict facets,
                            __global const int *restrict owners, __global const ulong *restrict paths,
                            __global const int *restrict kinds, __global const double *restrict surfaces,

@@ -4,12 +4,12 @@
 //            interp.clh
 //
 // source    type-1 nonuniform FFT in range, before the adjoint of quadtree backprojection (expand_subapertures.cl)
-// symbols   a_k(v)  amplitude of a point, |a|^2 = radar cross section, m^2, or of a facet, as in spread_facets.cl; with the weight
+// symbols   a_k(v)  amplitude of a point, |a|^2 = radar cross section, m^2, or of a facet, as in facet_amplitudes.cl; with the weight
 //                   of gains.clh; delta, kappa, sigma as in geometry.clh
 // macros    VW, FP64, BISTATIC, TAPS, TERMS, RANGE, ORDER, GAINS, ALIKE, VARIES, SPREADING as in the headers; records with LOCAL
-//           STRIDE  samples of a profile, a multiple of 8; delay 0 stands at STRIDE/2
+//           ROOM    samples that a profile has at most, where VW > 1
 //           FACETS  1: scatterers are facets; 0: points
-//           HH, HV, VH, VV, METAL, ROUGH, DIAGRAM_*  as in spread_facets.cl, where FACETS; one polarisation alone
+//           HH, HV, VH, VV, METAL, ROUGH, DIAGRAM_*  as in facet_amplitudes.cl, where FACETS; one polarisation alone
 //           COHERENT  1: some facets have a coherent part
 // reference: sarcl/reference/equations.py:point_echo, sarcl/reference/facet.py:facet_amplitude
 
@@ -35,7 +35,7 @@
 
 // wave: f/c, cycles/m; scale: k/(2 sqrt(pi) f^e); ratio: f over the patterns' frequency; range: R of gains.clh
 typedef struct {
-    int n, n_used, n_tiles, n_offsets, first, root, second;
+    int n, n_used, n_tiles, n_offsets, first, root, second, stride;
     float wave, scale, ratio, range;
 } leaves_numbers;
 
@@ -71,11 +71,12 @@ static inline complex_v facet_amplitude(leaves_numbers given, __global const flo
 // global size (kept pulses, tiles of this call): one work-item per profile
 //   pulse, constants, tile, offsets, table   as in backproject.cl, constants of the tiles of this call, from `first` on
 //   vectors     (n_tiles + 1) first vector of VW scatterers of each tile
-//   scatterers  (planes, n_offsets)  re, im of amplitude; or facets as in spread_facets.cl, 1/sqrt(eps) from plane `root` on;
+//   scatterers  (planes, n_offsets)  re, im of amplitude; or facets as in facet_amplitudes.cl, 1/sqrt(eps) from plane `root` on;
 //               0 where vectors are filled up
-//   up          (6)                  as in spread_facets.cl, where FACETS
+//   up          (6)                  as in facet_amplitudes.cl, where FACETS
 //   patterns, second, axes (n_used, 18)   see gains.clh
-//   out         (tiles of this call, n_used, STRIDE, 2)
+//   stride      samples of a profile, a multiple of 8; delay 0 stands at stride/2
+//   out         (tiles of this call, n_used, stride, 2)
 //   fronts      (tiles of this call, n_used)   number of facets that are seen from their front
 __kernel void leaves(leaves_numbers given, __global const float *restrict pulse, __global const float *restrict constants,
                      __global const float *restrict tile, __global const float *restrict offsets,
@@ -83,15 +84,15 @@ __kernel void leaves(leaves_numbers given, __global const float *restrict pulse,
                      __global const float *restrict up, __global const float *restrict patterns,
                      __global const float *restrict axes, __global const float *restrict table, __global float *restrict out,
                      __global int *restrict fronts) {
-    int p = get_global_id(0), k = given.first + get_global_id(1);
+    int p = get_global_id(0), k = given.first + get_global_id(1), stride = given.stride;
     __global const float *c = constants + (get_global_id(1) * (size_t)given.n + p) * N_CONST;
-    __global float *row = out + 2 * (size_t)STRIDE * (get_global_id(1) * (size_t)given.n_used + p);
+    __global float *row = out + 2 * (size_t)stride * (get_global_id(1) * (size_t)given.n_used + p);
 #if VW == 1
-    for (int i = 0; i < STRIDE; i++) vstore2((float2)(0, 0), i, row);
+    for (int i = 0; i < stride; i++) vstore2((float2)(0, 0), i, row);
 #else
-    float copies[COPIES][2 * STRIDE];
+    float copies[COPIES][2 * ROOM + 16];  // not 4096 bytes apart: a load would wait for stores to the others
     for (int q = 0; q < COPIES; q++)
-        for (int i = 0; i < 2 * STRIDE; i++) copies[q][i] = 0;
+        for (int i = 0; i < 2 * stride; i++) copies[q][i] = 0;
 #endif
     direction from_tx = load_transmitter(c), from_rx = load_receiver(c);
     int n_front = 0;
@@ -124,11 +125,11 @@ __kernel void leaves(leaves_numbers given, __global const float *restrict pulse,
         fv a = fma(re, cosine, im * sine), b = fma(im, cosine, -re * sine);  // times exp(-j 2 pi cycles)
         iv j;
         fv w[TAPS];
-        tap_weights(first_tap(at.t, at.base, STRIDE, STRIDE / 2, &j), table, w);
+        tap_weights(first_tap(at.t, at.base, stride, stride / 2, &j), table, w);
 #if VW == 1
 #pragma unroll
         for (int q = 0; q < TAPS; q++) {
-            __global float *s = row + 2 * (STRIDE / 2 + j + q);
+            __global float *s = row + 2 * (stride / 2 + j + q);
             vstore2(vload2(0, s) + (float2)(w[q] * a, w[q] * b), 0, s);
         }
 #else
@@ -144,7 +145,7 @@ __kernel void leaves(leaves_numbers given, __global const float *restrict pulse,
             float4 v = (float4)(re_of[l], im_of[l], re_of[l], im_of[l]);
 #pragma unroll
             for (int q = 0; q < TAPS; q += 2) {
-                float *s = copies[l % COPIES] + 2 * (STRIDE / 2 + first[l] + q);
+                float *s = copies[l % COPIES] + 2 * (stride / 2 + first[l] + q);
                 float4 tap = (float4)(weight[q][l], weight[q][l], weight[q + 1][l], weight[q + 1][l]);
                 vstore4(fma(tap, v, vload4(0, s)), 0, s);
             }
@@ -152,7 +153,7 @@ __kernel void leaves(leaves_numbers given, __global const float *restrict pulse,
 #endif
     }
 #if VW > 1
-    for (int i = 0; i < 2 * STRIDE; i += 8)
+    for (int i = 0; i < 2 * stride; i += 8)
         vstore8((vload8(0, copies[0] + i) + vload8(0, copies[1] + i)) + (vload8(0, copies[2] + i) + vload8(0, copies[3] + i)), 0, row + i);
 #endif
     if (FACETS) fronts[get_global_id(1) * (size_t)given.n_used + p] = n_front;

@@ -21,7 +21,7 @@
 #include "vec3_complex.clh"
 #include "pattern.clh"
 #include "gains.clh"
-#define CHANNELS NODES
+#include "tile_reach.clh"
 #include "spread_rows.clh"
 
 typedef struct {
@@ -54,7 +54,7 @@ __kernel void spread(spread_numbers given, __global const float *restrict pulse,
     for (int r = 0; r < PULSES; r++) {
         count[r] = unlit_count[r] = 0;
         size_t row = (size_t)split * given.n_used + first_pulse + r;
-        into[r] = begin_rows(&window, sums, rows, row, given.stride, given.origin);
+        into[r] = begin_rows(&window, sums, rows, row, NODES, given.stride, given.origin);
     }
     for (int k = split; k < given.n_tiles; k += get_global_size(1)) {
         int n_points = k == given.n_tiles - 1 ? given.last : TILE;

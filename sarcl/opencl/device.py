@@ -8,6 +8,7 @@ import threading
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from math import prod
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,7 +29,8 @@ if TYPE_CHECKING:
 else:
     Buffer = Kernel = Any  # in annotations alone: pyopencl is loaded with the first device
 
-GROUP = 16  # work-items per group on a CPU (1 where the size does not divide by it), for kernels of any group size
+GROUP = 16  # work-items per group of large launches on a CPU (1 where the size does not divide by it)
+LARGE = 4096  # work-items of a launch for which groups of 1 take 35 us longer; building a kernel for both takes 0.2 s
 
 
 @dataclass(frozen=True)
@@ -237,12 +239,12 @@ class Device:
     ) -> None:
         """Enqueue a kernel; Python ints become int32, buffers and numpy scalars go as they are.
 
-        group None: the driver chooses; on CPUs it is GROUP or 1, because PoCL builds a kernel again for each size.
+        group None: the driver chooses; on CPUs it is 1, from LARGE work-items on GROUP: PoCL builds for each size anew
         steps  about how many steps the longest loop of a work-item has: on devices other than CPUs a launch is cut into
                parts of 0.2 s (_launches.py), by the time per work-item and step of those before
         """
         if group is None and self.is_cpu:
-            group = (1 if size[0] % GROUP else GROUP, *(1 for _ in size[1:]))
+            group = (GROUP if prod(size) >= LARGE and size[0] % GROUP == 0 else 1, *(1 for _ in size[1:]))
         arguments = [np.int32(a) if isinstance(a, int) else a for a in args]
         with explained(self.info, f"kernel {kernel.function_name}", arguments), self._lock:
             count = self._counts[kernel] = self._counts.get(kernel, 0) + 1

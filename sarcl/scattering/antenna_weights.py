@@ -228,7 +228,7 @@ class AntennaWeights:
             "GAINS": len(self.patterns),
             "ALIKE": int(self.is_two_way),
             "VARIES": int(n_nodes > 1 and self.varies_over_band),
-            "CULL": int(self.limits.any()),
+            "CULL": int(self.limits.any()) * (2 if len(self.patterns) == 2 and not self.is_two_way else 1),
             "SPREADING": int(self.radar is not None),
         }
 

@@ -219,7 +219,7 @@ class FacetSet:
         vertical: np.ndarray, light: Light | None = None,
     ) -> np.ndarray:  # fmt: skip
         """Amplitude of every facet for antennas at tx, rx, m (3,), about its centroid, in float64: the reference of
-        kernels/spread_facets.cl, without gains and terrain shadows; complex128 (n frequencies, k, n_polarizations).
+        kernels/facet_amplitudes.cl, without gains and terrain shadows; complex128 (n frequencies, k, n_polarizations).
 
         light  of this pulse at these frequencies: facets that are lit in part; None: every facet is seen whole
         """
@@ -293,7 +293,7 @@ class FacetSet:
         return np.where(sheet, of_h, r_h), np.where(sheet, of_v, r_v), [np.where(sheet, t, 0) for t in through]
 
     def planes(self, order: np.ndarray, nodes: np.ndarray, metal: bool, dispersive: bool) -> np.ndarray:
-        """Rows of numbers as kernels/spread_facets.cl reads them, float32, in `order`; repeats at its end are blank."""
+        """Rows of numbers as facet_amplitudes.cl reads them, float32, in `order`; repeats at its end are blank."""
         roots = [] if metal else [self.roots(float(f)) for f in (nodes if dispersive else nodes[:1])]
         n = 7 + 6 * self.is_rough + 2 * len(roots)
         out = np.empty((n, len(order)), np.float32)
@@ -323,13 +323,13 @@ class FacetSet:
 
 
 def roughness_planes(materials: Sequence[Material]) -> np.ndarray:
-    """Height, m, number of the diagram, 1/width and 1/Omega of materials as spread_facets.cl reads them: (4, n)."""
+    """Height, m, number of the diagram, 1/width and 1/Omega of materials as facet_amplitudes.cl reads them: (4, n)."""
     rows = [(min(m.height, 1e3), DIAGRAMS.index(m.diagram), 1 / (m.width or 1.0), 1 / m.solid_angle) for m in materials]
     return np.array(rows).T
 
 
 def diagram_macros() -> dict[str, int]:
-    """Build-time macros of spread_facets.cl with the numbers of the diagrams: DIAGRAM_ISOTROPIC and so on."""
+    """Build-time macros of facet_amplitudes.cl with the numbers of the diagrams: DIAGRAM_ISOTROPIC and so on."""
     return {f"DIAGRAM_{name.upper()}": number for number, name in enumerate(DIAGRAMS)}
 
 

@@ -159,8 +159,8 @@ class RoughPieces:
         return self.device.download(corners, np.empty((n, 3, 3))), row if self.subset is None else row[self.subset]
 
     def placed(self, surfaces: np.ndarray, kinds: np.ndarray, stride: int) -> tuple[Any, Any]:
-        """Buffers of the centres of pieces, m float64 (3, stride), and of their numbers as spread_facets.cl reads them,
-        float32 (., stride).
+        """Buffers of the centres of pieces, m float64 (3, stride), and of their numbers
+        as facet_amplitudes.cl reads them, float32 (., stride).
 
         surfaces  (n, n_kinds): what pieces of a kind share, as place_pieces of the kernels reads it
         kinds     of these facets (k,)

@@ -95,7 +95,7 @@ HOT = {
     ("rays.cl", "any_hit"): Hot("1", "node of the tree and ray"),
     ("rays.cl", "nearest"): Hot("1", "node of the tree and ray"),
     ("spectral_echo.cl", "spread"): Hot("1", "scatterer and tile of the grid", loop="barrier", trips=("64",)),
-    ("spread_facets.cl", "facet_amplitudes"): Hot("VW", "pulse node, facet and frequency", unrolled="VW * NODES"),
+    ("facet_amplitudes.cl", "facet_amplitudes"): Hot("VW", "pulse node, facet and frequency", unrolled="VW * NODES"),
     ("spread_facets.cl", "spread_facets"): Hot("VW", "pulse and facet", loop="around", trips=("1",)),
     # each item brings a scatterer; the loop inside adds those of the group up, and runs again where a window moves
     ("spread_leaves.cl", "leaves"): Hot("VW", "kept pulse and point"),

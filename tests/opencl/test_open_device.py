@@ -165,11 +165,12 @@ MACROS = {
     "GAINS": 1, "ALIKE": 0, "VARIES": 1, "CULL": 1, "SPREADING": 1, "SEGMENT": 64,
     "SHARED": 1, "ITEMS": 16, "SLOPE_TAPS": 2, "SLOPE_TERMS": 2, "ABSORB": 1, "LINEAR": 1, "WEIGHT": 1, "TAPER": 64,
     "FROM64": 0, "NUMBER64": 0, "GROUPED": 0, "ENDS": 2, "FORWARD": 1, "WAVES": 2, "PARTLY": 1, "SHADED": 1,
-    "STRIDE": 64, "PULSES": 16, "SUMS": 4, "NEAR": 2, "FACETS": 1, "COHERENT": 1, "PARTS": 4, "GRADIENT": 1,
+    "ROOM": 64, "PULSES": 16, "SUMS": 4, "NEAR": 2, "FACETS": 1, "COHERENT": 1, "PARTS": 4, "GRADIENT": 1,
+    "CHANNELS": 0,
 }  # fmt: skip
 GROUPED = {"GROUPED": 1, "VW": 1, "TILE": 64}
 GAINS = "row_gradients_float64.cl", {"WEIGHT": 2, "GAINS": 2}
-SHARED = "nufft2d.cl", "spectral_echo.cl", "spread_facets.cl", "spread_points.cl"
+SHARED = "nufft2d.cl", "spectral_echo.cl", "facet_amplitudes.cl", "spread_facets.cl", "spread_points.cl"
 PROGRAMS = sorted(path.name for path in (Path(__file__).parents[2] / "kernels").glob("*.cl"))
 
 

@@ -88,6 +88,8 @@ class GatherKernel:
         self.lanes = device.info.vector_width
         macros = {**plan.macros(form.bistatic, form.wrap), "LOCAL": int(form.local), "VECTORS": VECTORS, "CHUNK": CHUNK}
         macros |= {"BEAM": int(form.beam), "NATIVE": int(plan.native), **form.weights}
+        if macros.get("WEIGHT") == 3:  # it reads no profile
+            macros |= {"TAPS": 2, "TERMS": 1}
         self.components = plan.components(form.bistatic, form.beam)
         self.constants = TileConstants(
             device, plan, bistatic=form.bistatic, wrap=form.wrap, local=form.local, beam=form.beam
@@ -120,7 +122,9 @@ class GatherKernel:
             "magic": self.magic,
             "second": block.second,
         }
-        size, group = (items, high - low), (items, 1) if items <= self.group else None
+        # on CPUs an item is a group: PoCL builds the kernel again for each size of groups
+        of_tile = 1 if self.device.is_cpu else items
+        size, group = (items, high - low), (of_tile, 1) if of_tile <= self.group else None
         launch = launch_numbers("backproject.cl", "backproject", **numbers)
         tables = block.profiles.buffer, self.table, pulses.buffer, constants, centers, offsets
         weights = block.weights or WEIGHT_BUFFERS * (self.table,)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -16,6 +16,7 @@ from ...numerics import range_profiles
 from ...numerics.device_profiles import SpreadSamples
 from ...numerics.pulse_geometry import PulseGeometry
 from ...numerics.tile_constants import TileConstants
+from ...opencl.device import Kernel
 from ...opencl.launch_numbers import launch_numbers
 from ...scattering.antenna_weights import AntennaWeights
 from ...scattering.facet_plan import FacetPlan
@@ -38,7 +39,7 @@ from ..spreading import (
 )
 from ._piece_tiling import PieceTiling
 
-KERNELS, NAMES = "spread_facets.cl", ("facet_amplitudes", "spread_facets")
+AMPLITUDES, SPREAD = "facet_amplitudes", "spread_facets"  # kernels, each in a file of its name
 MOST_PULSES = 256  # pulses per block where amplitudes are interpolated: two blocks cannot share their nodes
 NODES_SHARE = 0.2  # of the tolerance that is left: the most that interpolation between pulse nodes may take
 
@@ -179,23 +180,34 @@ class FacetSpreader:
         tiles, nodes, bistatic = self.tiles, scatterers.facet_plan.nodes, not self.antennas.is_monostatic
         self.channels = len(nodes) * len(self.polarizations)
         stride = plan.length + 2 * range_profiles.padding(plan.interpolator)
-        macros = {**plan.macros(bistatic), **weights.macros(len(nodes)), "TILE": tiles.per_tile}
-        macros |= {
+        of_weights = weights.macros(len(nodes))
+        both = {"BISTATIC": int(bistatic), "CULL": of_weights["CULL"], "TILE": tiles.per_tile}
+        of_amplitudes = {
+            **of_weights,
+            **both,
+            "RANGE": 0,
+            "ORDER": 2,
             "METAL": int(scatterers.metal),
             "DISPERSIVE": int(scatterers.dispersive),
             "ROUGH": int(self.facets.is_rough),
-            "PULSE_NODES": self.pulse_nodes.order,
             "PARTLY": int(self.partly),
-            "SHADED": int(self.facets.illumination is not None),
             **{name: int(name in self.polarizations) for name in POLARIZATIONS},
             **(diagram_macros() if self.facets.is_rough else {}),
         }
+        shaded = int(self.facets.illumination is not None)
+        of_spreading = {**plan.macros(bistatic), **both, "PULSE_NODES": self.pulse_nodes.order, "SHADED": shaded}
+
+        def kernels(of_rows: Mapping[str, int]) -> tuple[Kernel, ...]:
+            grouped = of_rows["GROUPED"]  # compilers for GPUs unroll loops over few channels; on CPUs no loop is short
+            fixed = {"NODES": grouped * len(nodes), "CHANNELS": grouped * self.channels}
+            return (
+                device.kernel(f"{AMPLITUDES}.cl", AMPLITUDES, **of_amplitudes | fixed, GROUPED=grouped),
+                device.kernel(f"{SPREAD}.cl", SPREAD, **{**of_spreading, **fixed, **of_rows}),
+            )
+
         self.constants = TileConstants(device, plan, bistatic=bistatic)
-        self.rows, (self.amplitudes, self.spread) = Rows.with_kernels(
-            device,
-            (stride, self.channels, len(self.antennas), tiles.n_tiles),
-            lambda of_rows: tuple(device.kernel(KERNELS, name, **macros, **of_rows) for name in NAMES),
-        )
+        shape = stride, self.channels, len(self.antennas), tiles.n_tiles
+        self.rows, (self.amplitudes, self.spread) = Rows.with_kernels(device, shape, kernels)
         at_nodes = nodes / SPEED_OF_LIGHT, scatterers.facet_plan.scales(), nodes / weights.frequency
         self.nodes = device.upload(np.stack(at_nodes).astype(np.float32))
         self.patterns, self.second = weights.upload(device)
@@ -291,8 +303,8 @@ class FacetSpreader:
             device.run(
                 self.amplitudes, (self.rows.items * len(at), n_block), group,
                 launch_numbers(
-                    KERNELS, "facet_amplitudes", n=n_nodes, n_offsets=n_offsets, second=self.second,
-                    range=self.weights.range, first=first,
+                    f"{AMPLITUDES}.cl", AMPLITUDES, n=n_nodes, n_offsets=n_offsets, second=self.second,
+                    range=self.weights.range, first=first, n_nodes=len(self.basis), record=self.constants.nbytes // 4,
                 ),
                 node_constants, tiles.offsets, tiles.planes, parts, self.nodes, self.up, self.patterns, node_axes,
                 self.reach, tiles.radius, made, marks,
@@ -300,9 +312,9 @@ class FacetSpreader:
             device.run(
                 self.spread, self.rows.size(used), group,
                 launch_numbers(
-                    KERNELS, "spread_facets", n=n, n_used=used, n_tiles=tiles.n_tiles, n_offsets=n_offsets,
+                    f"{SPREAD}.cl", SPREAD, n=n, n_used=used, n_tiles=tiles.n_tiles, n_offsets=n_offsets,
                     first=first, n_here=n_block, last=tiles.last, flush=self.flush,
-                    stride=self.rows.stride, origin=self.rows.stride // 2,
+                    stride=self.rows.stride, origin=self.rows.stride // 2, n_channels=self.channels,
                     near=np.float32(self.plan.near.radius),
                 ),
                 pulse, constants, tiles.references, tiles.offsets, made, marks, which_here, shares_here, seen,

@@ -13,6 +13,7 @@ from .levels import FactorizedPlan
 from .scatterers import Scatterers
 
 LEAVES = "spread_leaves.cl"
+LEAST_ROOM = 64  # samples of a work-item's profile on CPUs, else the next power of two: few programs serve all plans
 
 
 class Leaves:
@@ -26,7 +27,7 @@ class Leaves:
         cells, lanes = self.level.cells, device.info.vector_width
         self.constants = TileConstants(device, plan.leaf, bistatic=bistatic, local=True)
         self.macros = plan.leaf.macros(bistatic) | weights.macros(scatterers.n_frequencies) | dict(scatterers.macros)
-        self.macros |= {"STRIDE": self.level.stride, "CULL": 0}
+        self.macros |= {"ROOM": max(LEAST_ROOM, 1 << (self.level.stride - 1).bit_length()) if lanes > 1 else 0}
         del self.macros["WRAP"], self.macros["NODES"]
         packed = kept_records(self.level.decimation.kept, scatterers.cells.center, plan.leaf.length, lanes)
         self.pulses, self.n, self.n_used = device.upload(packed), packed.shape[2], len(self.level.decimation.kept)
@@ -57,8 +58,8 @@ class Leaves:
             (1, 1) if device.is_cpu else None,
             launch_numbers(
                 LEAVES, "leaves", n=self.n, n_used=self.n_used, n_tiles=n_cells, n_offsets=self.n_offsets, first=low,
-                root=channel.root, second=self.second, wave=channel.wave, scale=channel.scale, ratio=channel.ratio,
-                range=self.range,
+                root=channel.root, second=self.second, stride=self.level.stride, wave=channel.wave,
+                scale=channel.scale, ratio=channel.ratio, range=self.range,
             ),
             self.pulses, constants, self.references, self.offsets, self.vectors, self.planes, self.up, self.patterns,
             self.axes, self.table, out, fronts,

@@ -41,7 +41,7 @@ class Scatterers:
 
     planes   numbers of the scatterers as kernels/spread_leaves.cl reads them, (n,) each, in the order of the cells
     weights  of the antennas, at every pulse
-    macros   FACETS and those of facets, for the kernel;  up  float32 (6,), as spread_facets.cl reads it
+    macros   FACETS and those of facets, for the kernel;  up  float32 (6,), as facet_amplitudes.cl reads it
     """
 
     cells: ScattererCells
