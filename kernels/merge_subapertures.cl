@@ -95,7 +95,7 @@ static inline cv moved(__global const float *restrict row, int v, const RECORD f
     return fma(SWAPPED(x), IN_PAIRS((float2)(c[2], c[3])), x * (cv)c[1]);  // times exp(+j 2 pi kappa D_p)
 }
 
-#if SPAN > 1
+#if VW > 1
 // Zeros in vectors first ... last - 1 of a profile.
 static inline void clear(__global float *restrict profile, int first, int last) {
 #pragma unroll 1
@@ -118,7 +118,7 @@ __kernel void merge(merge_numbers given, __global const float *restrict source, 
     if (!FROM_CENTRE) source += 2 * (size_t)(parent[k] - given.first_parent) * given.n_used * given.stride;
     out += (size_t)(k - given.out_first) * given.n_kept * given.out_stride * 2;
     source += 2 * (long)(given.origin - given.reach);
-#if SPAN == 1
+#if VW == 1
     if (span >= given.out_stride) return;
     // Of the kept pulses first ... first + FILTER_TAPS - 1 the sums stay in registers: one of them leaves with each block.
     size_t row_size = 2 * (size_t)given.out_stride;

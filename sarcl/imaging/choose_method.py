@@ -40,6 +40,7 @@ MOST_CHOICES = 8  # that are kept for the same echoes
 STEP_OF_SEARCH = 2.0  # ratio of the tolerances that are tried for a refusal: plans of sub-apertures take long
 FLOAT64_SHARE = 1e-8  # error of gains in float64, over that in float32: 2^-29 by the digits, and a margin
 GAINS, SUMS = "float32 gains of the antenna", "rounding of float32 sums"
+GAINS_OF_FLOAT64, AIM = "float64 gains of the antenna", "aim it at the grid, or give the beam an angle"
 COORDINATES, NEAR_ORIGIN = "float64 coordinates of a plane's pixels", "put the origin near the scene"
 
 
@@ -199,7 +200,7 @@ class Float32Methods:
         """Refusal by the largest of the errors that no plan makes smaller and that take more than ROUNDING of the
         tolerance."""
         errors = (
-            ErrorTerm(GAINS, self.gains, "aim it at the grid, or give the beam an angle"),
+            ErrorTerm(GAINS, self.gains, AIM),
             ErrorTerm(COORDINATES, self.coordinates, NEAR_ORIGIN),
             ErrorTerm(SUMS, self.rounding, ""),
         )
@@ -306,8 +307,12 @@ def in_float64(task: FocusingTask, tolerance: float) -> Candidate:
     errors = {}
     if task.antenna is not None:
         radius = tiling_of(task.grid, max(float64_plan.SIDES)).radius
-        errors["float64 gains of the antenna"] = antenna_beam.rounding(task, radius, FLOAT64_SHARE)
+        errors[GAINS_OF_FLOAT64] = antenna_beam.rounding(task, radius, FLOAT64_SHARE)
     gains = sum(errors.values())
+    if not gains <= ROUNDING * tolerance:
+        best = askable(rounded_up(gains / ROUNDING)) if np.isfinite(gains) else None
+        how = f"in complex128: gains of the antenna have an error of {gains:.1g}"
+        return ToleranceUnreachable(tolerance, best, GAINS_OF_FLOAT64, AIM, how)
     try:
         plan, tiling = float64_plan.make_plan(task, tolerance - gains)
     except ToleranceUnreachable as refusal:

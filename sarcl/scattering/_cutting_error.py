@@ -279,7 +279,7 @@ class _Casters:
         """Those of a scene, seen from antennas, m (n_pulses, 3) each."""
         ground, heights = ground_of(scene, list(ends)), scene.heights
         rest = scene.triangles[~ground]
-        if heights is None or len(rest) == len(ground) or not is_overlooked(heights, scene.bounds, list(ends)):
+        if heights is None or len(rest) in (0, len(ground)) or not is_overlooked(heights, scene.bounds, list(ends)):
             return cls(SceneRays(device, scene.triangles), np.arange(len(ground)), None)
         return cls(SceneRays(device, rest), np.where(ground, -1, np.cumsum(~ground) - 1), heights)
 

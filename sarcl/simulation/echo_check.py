@@ -131,7 +131,7 @@ def _exact(part: Points | FacetSet, view: ChannelView, p: int) -> tuple[np.ndarr
     """Samples (n_polarizations, n) of pulse p at the frequencies, and their power at random phases."""
     antennas, frequencies, polarizations = view.antennas, view.frequencies, view.polarizations
     if isinstance(part, FacetSet):
-        crossed = np.zeros(len(part), bool) if not view.gated else across_edges(part, view, p)
+        crossed = across_edges(part, view, p)
         return facet_samples(
             part,
             view,

@@ -203,8 +203,6 @@ class SceneEchoes:
 
     def window_edges(self, view: ChannelView, first: int = 0) -> list[WindowEdges]:
         """Coherent facets where edges of the range window cross them."""
-        if not view.gated:
-            return []
         parts = (part.within(first, first + len(view.antennas), self.n_pulses) for part in self.facets)
         return [WindowEdges(part, view) for part in parts if part.is_mirror and not part.is_incoherent.all()]
 

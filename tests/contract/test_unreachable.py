@@ -242,7 +242,7 @@ def interpolated(verb=sarcl.echo):
     )  # fmt: skip
 
 
-PLANTED = {
+PLANTED = {  # plans of images are kept for the same echoes: raw[:] are others
     "interpolated channels": ("sarcl.simulation.channels._interpolated.InterpolatedChannels.fill", interpolated),
     "planning of interpolated channels": ("sarcl.simulation.scene_plan.plan_scene", interpolated),
     "a scene made ready": ("sarcl.simulation.planned_echoes.prepare_scene", interpolated),
@@ -250,21 +250,21 @@ PLANTED = {
         "sarcl.simulation.channels._interpolated.InterpolatedChannels.fill",
         lambda: interpolated(functools.partial(sarcl.plan, sarcl.echo)),
     ),
-    "direct": ("sarcl.imaging.direct.direct.make_plan", lambda: sarcl.backproject(RAW, PLANE)),
-    "direct, forecast": ("sarcl.imaging.direct.direct.make_plan", lambda: sarcl.plan(RAW, PLANE)),
+    "direct": ("sarcl.imaging.direct.direct.make_plan", lambda: sarcl.backproject(RAW[:], PLANE)),
+    "direct, forecast": ("sarcl.imaging.direct.direct.make_plan", lambda: sarcl.plan(RAW[:], PLANE)),
     "interpolator": ("sarcl.numerics.interpolator_choice.choose_interpolator", lambda: sarcl.backproject(RAW, LISTED)),
     "interpolator of lines": (
         "sarcl.numerics.interpolator_choice.choose_interpolator",
-        lambda: sarcl.backproject(RAW, PLANE),
+        lambda: sarcl.backproject(RAW[:], PLANE),
     ),
-    "float64": ("sarcl.imaging.float64.plan.make_plan", lambda: sarcl.backproject(RAW, PLANE, tolerance=1e-8)),
+    "float64": ("sarcl.imaging.float64.plan.make_plan", lambda: sarcl.backproject(RAW[:], PLANE, tolerance=1e-8)),
     "sub-apertures": (
         "sarcl.imaging.factorized.plan.make_plan",
-        lambda: sarcl.backproject(SMOOTH, LARGE, tolerance=1e-2),
+        lambda: sarcl.backproject(SMOOTH[:], LARGE, tolerance=1e-2),
     ),
     "sub-apertures, decimation": (
         "sarcl.imaging.factorized.plan.decimated",
-        lambda: sarcl.plan(SMOOTH, LARGE, tolerance=1e-2),
+        lambda: sarcl.plan(SMOOTH[:], LARGE, tolerance=1e-2),
     ),
     "lit parts": (
         "sarcl.visibility.lit_parts.candidate_pairs",
@@ -285,13 +285,13 @@ def test_a_bug_is_not_taken_for_a_refusal(name, monkeypatch):
 
 def test_where_float32_fails_a_bug_in_float64_is_not_hidden(monkeypatch):
     raw = noise_history()
-    sarcl.backproject(raw, PLANE, tolerance=1e-6)
+    sarcl.backproject(raw[:], PLANE, tolerance=1e-6)
 
     def refuse(task, tolerance, on=None):
         raise ToleranceUnreachable(tolerance, None, "test")
 
     monkeypatch.setattr("sarcl.imaging.direct.direct.make_plan", refuse)
-    assert sarcl.backproject(raw, PLANE, tolerance=1e-3).data.dtype == np.complex128
+    assert sarcl.backproject(raw[:], PLANE, tolerance=1e-3).data.dtype == np.complex128
     monkeypatch.setattr("sarcl.imaging.float64.plan.make_plan", broken)
     with pytest.raises(ValueError, match=BUG):
         sarcl.backproject(raw, PLANE, tolerance=1e-3)

@@ -209,7 +209,7 @@ def test_one_row_and_one_sample_are_kept(tmp_path, shape):
 
 
 def test_samples_are_copied_in_blocks_and_read_only_as_asked(tmp_path):
-    raw, asked = a_raw(7, 2**20), []  # blocks of 2^24 bytes: two rows of complex64
+    raw, asked = a_raw(7, 2**18), []  # blocks of 2^22 bytes: two rows of complex64
 
     class Source:
         shape, dtype = raw.samples.shape, raw.samples.dtype

@@ -134,13 +134,13 @@ def test_scatterers_that_meet_in_a_row_of_any_length_add_up_with_the_error_of_ea
     sums = -(-4 * stride // 16) * 16  # where they begin: at a multiple of 32 bytes
     body = (
         "row_window window;"
-        f"spread_rows rows = begin_rows(&window, out + {sums}, out, 0, {stride}, 0);"
+        f"spread_rows rows = begin_rows(&window, out + {sums}, out, 0, 1, {stride}, 0);"
         f"for (int m = 0; m < {times}; m++) {{"
         "fv w[TAPS]; for (int k = 0; k < TAPS; k++) w[k] = LOAD(0, x + (3 + k) * n);"
         "add_scatterers(&rows, 0, (iv)1, nearest_int(LOAD(0, x)), w, LOAD(0, x + n), LOAD(0, x + 2 * n));"
         "empty_rows(&rows); }"
     )
-    macros = {"TAPS": taps, "CHANNELS": 1, "GROUPED": 0, "SUMS": 4 if lanes > 1 else 1}
+    macros = {"TAPS": taps, "GROUPED": 0, "SUMS": 4 if lanes > 1 else 1}
     planes = -(-(sums + 8 * (stride + 16)) // lanes)
     out = probe(device, monkeypatch, body, given, planes, ("common.clh", "spread_rows.clh"), **macros).ravel()
     exact = np.zeros((stride, 2))

@@ -54,7 +54,7 @@ class ExactFacets:
                 (part.two_sided & turned(given, looks[0], looks[1], part.forward))[:, None], -given, given
             )
             front = lit_share(seen_side, looks[0], looks[1], part.forward) > 0
-            inside = inside_window(part, antennas, p) if self.view.gated else np.ones(len(part), bool)
+            inside = inside_window(part, antennas, p)
             ends, waves = [end[p : p + 1] for end in antennas.ends], 2 * np.pi * self.view.frequencies / SPEED_OF_LIGHT
             values, _ = facet_samples(part, self.view, p, inside, part.light(p, ends, waves))
             samples[row] += values.astype(np.complex64)

@@ -134,7 +134,7 @@ class SheetEchoes:
         the number of facets outside the range window."""
         behind, view = self.behind, self.view
         n, antennas = len(self), view.antennas
-        inside = inside_window(behind.part, antennas, pulse) if view.gated else np.ones(n, bool)
+        inside = inside_window(behind.part, antennas, pulse)
         values = np.zeros((len(view.polarizations), len(view.frequencies)), np.complex128)
         powers, step = np.zeros(values.shape), max(1, AT_ONCE // n)
         for first in range(0, len(view.frequencies), step):
