@@ -244,6 +244,14 @@ def test_what_is_missing_is_refused_with_its_key(tmp_path, key):
     assert not list(tmp_path.iterdir())
 
 
+def test_all_that_is_missing_is_named_at_once(tmp_path):
+    raw = replace(aircraft(False).raw, time=None, rx_velocity=None)
+    words = {k: v for k, v in METADATA.items() if k not in ("ModeType", "CollectionStart")}
+    wanted = r"give metadata=\{'TxTime': \.\.\.\}; it must have RcvVel, ModeType, CollectionStart too$"
+    with pytest.raises(ValueError, match=wanted):
+        raw.save(tmp_path / "x.cphd", origin=ORIGIN, metadata=words)
+
+
 @pytest.mark.parametrize(
     ("field", "key"),
     [("time", "TxTime"), ("tx_velocity", "TxVel"), ("rx_velocity", "RcvVel"), ("polarization", "TxPol")],

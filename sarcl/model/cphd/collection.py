@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 MODES = ("SPOTLIGHT", "STRIPMAP", "DYNAMIC STRIPMAP")
 REQUIRED = ("CollectorName", "CoreName", "ModeType", "Classification", "ReleaseInfo")
 OPTIONAL = ("IlluminatorName", "ModeID", "CountryCode", "CollectType")
-OTHERS = ("CollectionStart", "TxPol", "RcvPol", "SRPPos", "ImageArea", "TxTime", "TxVel", "RcvVel")
+OF_ROWS = {"time": "TxTime", "tx_velocity": "TxVel", "rx_velocity": "RcvVel"}  # names by fields of the echoes
+OTHERS = ("CollectionStart", "TxPol", "RcvPol", "SRPPos", "ImageArea", *OF_ROWS.values())
 STEPS, MET = 20, 1e-7  # iterations, and error in m, of the point at which reference ranges meet
 SAME = 1.0  # m: farther from where the sender has moved on to, the receiver is on another platform
 
@@ -43,13 +44,12 @@ def collection_of(raw: PhaseHistory, options: CphdOptions) -> Collection:
     if options.sgn not in (-1, 1) or isinstance(options.sgn, bool):
         raise ValueError(f"sgn is {options.sgn!r}; give -1, or +1: then the samples are conjugated")
     _check_samples(raw, options.kind)
-    words, is_local = Words(options.kind, options.metadata, (*REQUIRED, *OPTIONAL, *OTHERS)), options.origin is not None
+    of_rows = [key for name, key in OF_ROWS.items() if getattr(raw, name) is None]
+    must, is_local = (*of_rows, *REQUIRED, "CollectionStart"), options.origin is not None
+    words = Words(options.kind, options.metadata, (*REQUIRED, *OPTIONAL, *OTHERS), must=must)
     corner, local = frame(raw.tx[0], options.kind, options.origin, options.axes)
-    time = per_row(raw, words, "time", "TxTime", ())
-    velocities = [
-        per_row(raw, words, name, key, (3,)) @ local
-        for name, key in (("tx_velocity", "TxVel"), ("rx_velocity", "RcvVel"))
-    ]
+    time = per_row(raw, words, "time", OF_ROWS["time"], ())
+    velocities = [per_row(raw, words, name, OF_ROWS[name], (3,)) @ local for name in ("tx_velocity", "rx_velocity")]
     tx, rx = (corner + positions @ local for positions in (raw.tx, raw.rx))
     point = _reference_point(raw, words, corner, local, is_local)
     early = max(0, int(np.ceil(-time.min())))  # whole seconds by which the file's clock starts before time 0

@@ -23,6 +23,7 @@ class Words:
     """What metadata= gives for a file of `kind`. ValueError for a name that is not known, or that is missing.
 
     defaults  values of names that metadata= does not give, as another file of the same echoes has them
+    must      names that the file must have: a refusal lists all of them that are missing
     """
 
     def __init__(
@@ -31,8 +32,9 @@ class Words:
         metadata: Mapping[str, ArrayLike | np.datetime64] | None,
         known: Sequence[str],
         defaults: Mapping[str, Any] | None = None,
+        must: Sequence[str] = (),
     ) -> None:
-        self.kind = kind
+        self.kind, self.must = kind, must
         unknown = [key for key in metadata or {} if key not in known]
         if unknown:
             raise ValueError(
@@ -43,7 +45,9 @@ class Words:
     def need(self, key: str, why: str) -> Any:
         """The value of a key; ValueError where there is none."""
         if self.values.get(key) is None:
-            raise ValueError(f"{why}, which a {self.kind} file must have; give metadata={{{key!r}: ...}}")
+            others = [other for other in self.must if other != key and self.values.get(other) is None]
+            too = f"; it must have {', '.join(others)} too" if others else ""
+            raise ValueError(f"{why}, which a {self.kind} file must have; give metadata={{{key!r}: ...}}{too}")
         return self.values[key]
 
     def text(self, key: str) -> str:
