@@ -103,8 +103,8 @@ def choose(
     known, key = _choices.setdefault(task.raw, {}), (conditions, method, tolerance, devices, float64)
     chosen = known.pop(key, None) or _cheapest(task, method, tolerance, devices, float64)
     known[key] = chosen  # the last one
-    if len(known) > MOST_CHOICES:
-        known.pop(next(iter(known)), None)
+    for oldest in list(known)[:-MOST_CHOICES]:  # a copy: other threads may choose at the same time
+        known.pop(oldest, None)
     return chosen
 
 

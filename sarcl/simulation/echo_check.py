@@ -194,7 +194,7 @@ def exact_light(
     index, waves = np.flatnonzero((rows >= 0) | crossed), 2 * np.pi * frequencies / SPEED_OF_LIGHT
     if not len(index):
         return Light.whole(1, len(frequencies))
-    ends, on_plane, whole = [end[pulse] for end in antennas.ends], 1e-9, (-np.inf, np.inf)
+    ends, on_plane, no_limits = [end[pulse] for end in antennas.ends], 1e-9, (-np.inf, np.inf)
     share, mean = np.empty((1, len(index))), np.empty((1, len(index), len(waves)), np.complex128)
     limits = part_limits(part.triangles[index], antennas, pulse)
     for i, (row, cut, window) in enumerate(zip(rows[index].tolist(), crossed[index], limits.tolist(), strict=True)):
@@ -202,7 +202,7 @@ def exact_light(
         if row >= 0 and part.lit_parts is not None:
             occluders, others = part.lit_parts.occluders_at(pulse, row)
             facet, on_plane = part.lit_parts.facet_at(row), part.lit_parts.on_plane
-        limit = (window[0], window[1]) if cut else whole
+        limit = (window[0], window[1]) if cut else no_limits
         share[0, i], mean[0, i] = lit_part(facet, occluders, ends, waves, on_plane, others, window=limit)
     return Light(index, np.maximum(share, 0), mean)
 

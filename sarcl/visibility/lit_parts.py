@@ -371,11 +371,11 @@ class LitParts:
         begin, end = (np.searchsorted(pairs[:, 0], places, side) for side in ("left", "right"))
         index = [np.arange(a, b) for a, b in zip(begin.tolist(), end.tolist(), strict=True)]
         own = np.repeat(np.arange(len(rows)), end - begin)
-        some = replace(self._pieces.part(places), index=np.arange(len(rows)), triangles=triangles)
+        clipped = replace(self._pieces.part(places), index=np.arange(len(rows)), triangles=triangles)
         of_own = np.stack([own, pairs[np.concatenate(index), 1]], axis=1) if len(own) else np.zeros((0, 2), pairs.dtype)
         antennas = np.stack([one - self._origin for one in ends])[None]
         mean = np.empty((len(rows), len(waves)), np.complex64)
-        for _, part, _, values in self._clipper.light(some, np.arange(len(rows)), of_own, antennas, waves):
+        for _, part, _, values in self._clipper.light(clipped, np.arange(len(rows)), of_own, antennas, waves):
             mean[part] = values[0]
         return mean
 

@@ -61,11 +61,11 @@ class WindowEdges:
         facet and pulse counts twice; those whose centroids lie outside the window contribute after all."""
         view, counts = self.view, Counts()
         for row, p in enumerate(pulses):
-            for limit, some in self._at_edges(p):
-                samples[row] += self._at_edge(p, limit, some, view.frequencies).astype(np.complex64)
-                delta = self._half_paths(self._places[some], p)
+            for limit, numbers in self._at_edges(p):
+                samples[row] += self._at_edge(p, limit, numbers, view.frequencies).astype(np.complex64)
+                delta = self._half_paths(self._places[numbers], p)
                 outside = (delta < view.antennas.near[p]) | (delta > view.antennas.far[p])
-                counts += Counts(0, -int(outside.sum()), crossed=len(some))
+                counts += Counts(0, -int(outside.sum()), crossed=len(numbers))
         clock.lap("echo")
         return counts
 
@@ -74,18 +74,20 @@ class WindowEdges:
         across both edges belong to the near one."""
         near, far = float(self.view.antennas.near[pulse]), float(self.view.antennas.far[pulse])
         at_near, at_far = self._across(pulse, near), self._across(pulse, far)
-        for limit, some in ((near, at_near), (far, np.setdiff1d(at_far, at_near, assume_unique=True))):
-            if len(some):
-                yield limit, some
+        for limit, numbers in ((near, at_near), (far, np.setdiff1d(at_far, at_near, assume_unique=True))):
+            if len(numbers):
+                yield limit, numbers
 
     def _across(self, pulse: int, limit: float) -> np.ndarray:
         """Numbers of the coherent facets that an edge of the window, m about the reference range, may cross."""
         groups = np.flatnonzero(np.abs(self._half_paths(self._middles, pulse) - limit) <= self._radii)
         if not len(groups):
             return groups
-        some = (self._starts[groups, None] + np.arange(TOGETHER)).ravel()
-        some = some[some < len(self._rows)]
-        return np.asarray(some[np.abs(self._half_paths(self._places[some], pulse) - limit) < self._reach[some]])
+        numbers = (self._starts[groups, None] + np.arange(TOGETHER)).ravel()
+        numbers = numbers[numbers < len(self._rows)]
+        return np.asarray(
+            numbers[np.abs(self._half_paths(self._places[numbers], pulse) - limit) < self._reach[numbers]]
+        )
 
     def _half_paths(self, places: np.ndarray, pulse: int) -> np.ndarray:
         """Half paths over places, m (n, 3), about the reference range of a pulse."""
@@ -93,18 +95,18 @@ class WindowEdges:
         paths = sum(np.linalg.norm(places - end[pulse], axis=1) for end in (antennas.tx, antennas.rx))
         return np.asarray(paths / 2 - antennas.reference_range[pulse])
 
-    def _at_edge(self, pulse: int, limit: float, some: np.ndarray, frequencies: np.ndarray) -> np.ndarray:
+    def _at_edge(self, pulse: int, limit: float, numbers: np.ndarray, frequencies: np.ndarray) -> np.ndarray:
         """What the facets of these numbers lack at an edge of the window (n_polarizations, n).
 
         All lie at the edge: about its delay, few frequencies of the band tell of all."""
-        view, antennas, rows = self.view, self.view.antennas, self._rows[some]
+        view, antennas, rows = self.view, self.view.antennas, self._rows[numbers]
         low, high = float(frequencies.min()), float(frequencies.max())
-        beyond = np.abs(self._half_paths(self._places[some], pulse) - limit) + self._reach[some]
+        beyond = np.abs(self._half_paths(self._places[numbers], pulse) - limit) + self._reach[numbers]
         radians = 2 * np.pi * (high - low) * float(beyond.max()) / SPEED_OF_LIGHT
         n = FEWEST_NODES + int(NODES_PER_RADIAN * radians)
         nodes = frequencies if n >= len(frequencies) else chebyshev((low + high) / 2, high - low, n)
         at_edge = replace(antennas, reference_range=antennas.reference_range + limit)
-        light = self._light(pulse, some, 2 * np.pi * nodes / SPEED_OF_LIGHT)
+        light = self._light(pulse, numbers, 2 * np.pi * nodes / SPEED_OF_LIGHT)
         values, _ = facet_samples(
             self.facets.picked(rows),
             replace(view, antennas=at_edge, frequencies=nodes),
@@ -117,18 +119,18 @@ class WindowEdges:
         turn = (np.longdouble(2 * limit / SPEED_OF_LIGHT) * frequencies) % 1
         return np.asarray(values * np.exp(-2j * np.pi * turn.astype(np.float64)))
 
-    def _light(self, pulse: int, some: np.ndarray, waves: np.ndarray) -> Light:
+    def _light(self, pulse: int, numbers: np.ndarray, waves: np.ndarray) -> Light:
         """The parts of these facets inside the window, less what counts of each by its centroid."""
-        antennas, facets, rows = self.view.antennas, self.facets, self._rows[some]
-        corners = facets.triangles[rows] - self._places[some][:, None]
-        both = sum(unit(end[pulse] - self._places[some]) for end in (antennas.tx, antennas.rx))
+        antennas, facets, rows = self.view.antennas, self.facets, self._rows[numbers]
+        corners = facets.triangles[rows] - self._places[numbers][:, None]
+        both = sum(unit(end[pulse] - self._places[numbers]) for end in (antennas.tx, antennas.rx))
         order = np.argsort(np.einsum("kij,kj->ki", corners, both), axis=1)
         corners = np.take_along_axis(corners, order[:, :, None], axis=1)
         phases = np.einsum("kij,kj->ki", corners, both)
         mean = triangle_mean(waves * (phases[:, 1:2] - phases[:, :1]), waves * (phases[:, 2:] - phases[:, :1]))
-        lit = partial(self._seen_past_others, pulse, rows, corners + self._places[some][:, None], waves)
+        lit = partial(self._seen_past_others, pulse, rows, corners + self._places[numbers][:, None], waves)
         mean = lit(mean, np.arange(len(rows)), None)
-        delta = self._half_paths(self._places[some], pulse)
+        delta = self._half_paths(self._places[numbers], pulse)
         last, first = 2 * (delta - antennas.far[pulse]), 2 * (delta - antennas.near[pulse])
         part = -1.0 * ((last <= 0) & (first >= 0))[:, None] * mean
         for limit, sign in ((last, 1), (first, -1)):
@@ -147,17 +149,17 @@ class WindowEdges:
         triangles: np.ndarray,
         waves: np.ndarray,
         means: np.ndarray,
-        some: np.ndarray,
+        numbers: np.ndarray,
         corner: _Corners | None,
     ) -> np.ndarray:
-        """Means over facets `some` of those that lie at an edge, or over a corner of each, of what antennas see past
+        """Means over facets `numbers` of those that lie at an edge, or over a corner of each, of what antennas see past
         other facets."""
         facets, antennas = self.facets, self.view.antennas
         if facets.lit_rows is None or facets.lit_parts is None:
             return means
-        partly = np.flatnonzero(facets.lit_rows[rows[some]] >= 0)
+        partly = np.flatnonzero(facets.lit_rows[rows[numbers]] >= 0)
         if len(partly):
-            which, ends = some[partly], [end[pulse] for end in antennas.ends]
+            which, ends = numbers[partly], [end[pulse] for end in antennas.ends]
             parts = triangles[which] if corner is None else corner.triangles(triangles, which)
             middles = centroids(parts) - centroids(triangles[which])
             both = sum(unit(end[pulse] - centroids(triangles[which])) for end in (antennas.tx, antennas.rx))
@@ -194,17 +196,17 @@ class _Corners:
         along = np.where(spans != 0, (at - tip)[:, None] / np.where(spans != 0, spans, 1), 0.0)
         return cls(np.stack([tip, at], axis=1), along.prod(axis=1), is_upper, np.where(is_upper, 2, 0), along)
 
-    def means(self, some: np.ndarray, waves: np.ndarray) -> np.ndarray:
-        """Means of exp(j k phi) over corners `some`: complex128 (n, m);  waves  k, rad/m (m,)"""
-        tip, at = self.phases[some].T
+    def means(self, numbers: np.ndarray, waves: np.ndarray) -> np.ndarray:
+        """Means of exp(j k phi) over corners `numbers`: complex128 (n, m);  waves  k, rad/m (m,)"""
+        tip, at = self.phases[numbers].T
         turn = waves * (at - tip)[:, None]
         return np.asarray(np.exp(1j * waves * ((tip + 2 * at) / 3)[:, None]) * triangle_mean(turn, turn))
 
-    def triangles(self, triangles: np.ndarray, some: np.ndarray) -> np.ndarray:
-        """The corners of triangles `some`, m (n, 3, 3), of all triangles, their own corners by rising phase."""
-        rows, number = np.arange(len(some)), self.number[some]
-        whole = triangles[some]
-        tip, ends = whole[rows, number], np.stack([whole[:, 1], whole[rows, 2 - number]], axis=1)
+    def triangles(self, triangles: np.ndarray, numbers: np.ndarray) -> np.ndarray:
+        """The corners of triangles `numbers`, m (n, 3, 3), of all triangles, their own corners by rising phase."""
+        rows, tips = np.arange(len(numbers)), self.number[numbers]
+        corners = triangles[numbers]
+        tip, ends = corners[rows, tips], np.stack([corners[:, 1], corners[rows, 2 - tips]], axis=1)
         return np.concatenate(
-            [tip[:, None], tip[:, None] + self.along[some][:, :, None] * (ends - tip[:, None])], axis=1
+            [tip[:, None], tip[:, None] + self.along[numbers][:, :, None] * (ends - tip[:, None])], axis=1
         )
