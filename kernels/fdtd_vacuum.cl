@@ -21,8 +21,9 @@
 //           front   number of cells from node 0 to the front of the wave, along its direction;  along_x, along_y, along_z
 //                   that direction, along_z not 0: cells beyond the front are not updated, 16 at a time
 //           s  c dt/dx;  n_planes, n_rows, n_vectors  planes of the grid, rows of a plane, vectors of a row
-//           first  first of the planes that are updated;  rows_each  rows that a work-item updates
-//           wave_rows (2, groups + 1) int: first entry of each group of rows_each rows, groups in the order of planes, in
+//           first, last  planes that are updated, without `last`;  each  rows of a plane, on GPUs cells along x, that a
+//                   work-item updates
+//           wave_rows (2, groups + 1) int: first entry of each group of `each` rows, groups in the order of planes, in
 //                   the two parts of the list of the incident wave;  wave  1: it enters in this step
 //           rows    (groups + 1) int: first entry of each group in the list of the target;  others: fdtd_lists.clh
 // macros    LANES;  ABSORB  1 where layers absorb;  LISTS  1 where work-items correct their rows
@@ -51,28 +52,52 @@ static inline int2 reached(float ahead, float along_z, int n_vectors) {
     return along_z > 0 ? (int2)(0, min((block + 1) * vectors, n_vectors)) : (int2)(max(block, 0) * vectors, n_vectors);
 }
 
-// global size (1 or vectors of a row, rows / rows_each rounded up, planes), for both kernels
+// First cell of row (i, j) that is not updated although the wave has reached it, and the first one after these.
+#define HOLE resting[i * n_rows + j]
+// First vector of row (i, j) that the wave has reached, and the first one after these.
+#define LIT (front < INFINITY ? reached(front - along_x * i - along_y * j, along_z, n_vectors) : (int2)(0, n_vectors))
+
+#if LISTS
+// global size (1, rows / each rounded up, planes), for both kernels: a work-item updates rows, vector by vector
 #define EACH_VECTOR                                                                                             \
-    int i = given.first + (int)get_global_id(2), plane_layer = layer_of(i, n_planes, thick), any = 0;           \
-    int j_end = min(n_rows, ((int)get_global_id(1) + 1) * rows_each);                                           \
-    for (int j = (int)get_global_id(1) * rows_each; j < j_end; j++) {                                           \
-        int2 lit = reached(front - along_x * i - along_y * j, along_z, n_vectors);                              \
-        int hole = resting[2 * (i * n_rows + j)] / LANES, hole_end = resting[2 * (i * n_rows + j) + 1] / LANES; \
+    int i = given.first + (int)get_global_id(2), any = 0;                                                       \
+    int j_end = min(n_rows, ((int)get_global_id(1) + 1) * each);                                                \
+    for (int j = (int)get_global_id(1) * each; j < j_end; j++) {                                                \
+        int2 lit = LIT, hole = convert_int2(HOLE) / LANES;                                                      \
         any |= lit.x < lit.y;                                                                                   \
-        for (int v = (int)get_global_id(0), at = start + i * plane + j * row + LANES * v; v < lit.y;            \
-             v += (int)get_global_size(0), at += LANES * (int)get_global_size(0)) {                             \
-            if (v < lit.x || (v >= hole && v < hole_end)) continue;
+        for (int v = lit.x, at = start + i * plane + j * row + LANES * v; v < lit.y; v++, at += LANES) {        \
+            if (v >= hole.x && v < hole.y) continue;
 
 #define END_EACH_VECTOR \
     }                   \
     }
+#define KEPT(value, place) LOAD_LANES(place)
+#define KEEP(value, number)
+#else
+// global size (cells of a row, rows, planes / each rounded up), for both kernels: a work-item updates cells along x one after
+// the other, and keeps the values that the next one needs; work-items beyond the grid do nothing
+#define EACH_VECTOR                                                                                             \
+    int v = (int)get_global_id(0), j = (int)get_global_id(1), kept = 0;                                         \
+    int i = given.first + (int)get_global_id(2) * each, i_end = j < n_rows ? min(given.last, i + each) : 0;     \
+    for (int at = start + i * plane + j * row + v; i < i_end; i++, at += plane) {                               \
+        int2 lit = LIT, hole = convert_int2(HOLE);                                                              \
+        int past = kept;                                                                                        \
+        kept = v >= lit.x && v < lit.y && (v < hole.x || v >= hole.y);                                          \
+        if (!kept) continue;
+
+#define END_EACH_VECTOR }
+#define KEPT(value, place) (past ? (value) : LOAD_LANES(place))
+#define KEEP(value, number) value = number;
+#endif
 
 // curl of a field from its differences dx_y (of component y along x) ..., with the layers
 #define CURL                                                                                                 \
     lanes curl_x = dy_z - dz_y, curl_y = dz_x - dx_z, curl_z = dx_y - dy_x;                                  \
     if (ABSORB) {                                                                                            \
         int cells = LANES * n_vectors, k = LANES * v, row_layer = layer_of(j, n_rows, thick);                \
-        int in_plane = n_rows * cells, in_rows = 2 * thick * cells, q = layer_of(k, cells, 16);              \
+        int plane_layer = layer_of(i, n_planes, thick);                                                      \
+        int in_plane = n_rows * cells, in_rows = 2 * thick * cells, end = LANES == 1 ? thick : LANES;         \
+        int q = k < end ? k : k < cells - end ? -1 : k - cells + 32;                                         \
         __global float *psi_y = psi + 4 * thick * in_plane, *psi_z = psi_y + 2 * n_planes * in_rows;         \
         if (plane_layer >= 0)                                                                                \
             absorb(psi + plane_layer * in_plane + j * cells + k, 2 * thick * in_plane,                       \
@@ -111,11 +136,11 @@ static inline int2 reached(float ahead, float along_z, int n_vectors) {
 #endif
 
 #define GRID_ARGUMENTS \
-    __global float *restrict psi, __global const float *restrict coefficient, __global const ushort *restrict resting
+    __global float *restrict psi, __global const float *restrict coefficient, __global const ushort2 *restrict resting
 
 // Of both updates; the last line is read where LISTS.
 typedef struct {
-    int thick, component, start, plane, row, n_planes, n_rows, n_vectors, rows_each, first;
+    int thick, component, start, plane, row, n_planes, n_rows, n_vectors, each, first, last;
     float s, front, along[3];
     int wave, u_at, n_points, quiet_below, quiet_above, count, record, conducts;
 } update_numbers;
@@ -123,7 +148,7 @@ typedef struct {
 // Those of the grid by their own names.
 #define GRID_NUMBERS                                                                                                 \
     int thick = given.thick, component = given.component, start = given.start, plane = given.plane, row = given.row; \
-    int n_planes = given.n_planes, n_rows = given.n_rows, n_vectors = given.n_vectors, rows_each = given.rows_each;  \
+    int n_planes = given.n_planes, n_rows = given.n_rows, n_vectors = given.n_vectors, each = given.each;  \
     float s = given.s, front = given.front, along_x = given.along[0], along_y = given.along[1], along_z = given.along[2];
 
 __kernel void update_e(update_numbers given, __global float *restrict e, __global const float *restrict h, GRID_ARGUMENTS
@@ -131,9 +156,12 @@ __kernel void update_e(update_numbers given, __global float *restrict e, __globa
     GRID_NUMBERS
     __global const float *hx = h, *hy = h + component, *hz = hy + component;
     __global float *ex = e, *ey = e + component, *ez = ey + component;
+    lanes y_before = 0, z_before = 0;
     EACH_VECTOR
             lanes x = LOAD_LANES(hx + at), y = LOAD_LANES(hy + at), z = LOAD_LANES(hz + at);
-            lanes dx_y = y - LOAD_LANES(hy + at - plane), dx_z = z - LOAD_LANES(hz + at - plane);
+            lanes dx_y = y - KEPT(y_before, hy + at - plane), dx_z = z - KEPT(z_before, hz + at - plane);
+            KEEP(y_before, y)
+            KEEP(z_before, z)
             lanes dy_x = x - LOAD_LANES(hx + at - row), dy_z = z - LOAD_LANES(hz + at - row);
             lanes dz_x = x - LOAD_LANES(hx + at - 1), dz_y = y - LOAD_LANES(hy + at - 1);
             CURL
@@ -153,9 +181,12 @@ __kernel void update_h(update_numbers given, __global const float *restrict e, _
     GRID_NUMBERS
     __global float *hx = h, *hy = h + component, *hz = hy + component;
     __global const float *ex = e, *ey = e + component, *ez = ey + component;
+    lanes y_after = 0, z_after = 0;
     EACH_VECTOR
-            lanes x = LOAD_LANES(ex + at), y = LOAD_LANES(ey + at), z = LOAD_LANES(ez + at);
-            lanes dx_y = LOAD_LANES(ey + at + plane) - y, dx_z = LOAD_LANES(ez + at + plane) - z;
+            lanes x = LOAD_LANES(ex + at), y = KEPT(y_after, ey + at), z = KEPT(z_after, ez + at);
+            y_after = LOAD_LANES(ey + at + plane);
+            z_after = LOAD_LANES(ez + at + plane);
+            lanes dx_y = y_after - y, dx_z = z_after - z;
             lanes dy_x = LOAD_LANES(ex + at + row) - x, dy_z = LOAD_LANES(ez + at + row) - z;
             lanes dz_x = LOAD_LANES(ex + at + 1) - x, dz_y = LOAD_LANES(ey + at + 1) - y;
             CURL

@@ -7,6 +7,7 @@ plane and its neighbours alone, so that a block of steps can be done tile by til
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,8 @@ from .target import Target
 BLOCK = 8  # steps of a block, which is done tile by tile
 PERIODS = (8, 4, 2)  # steps between two samples of the residuals, where the pulse allows (currents:sample_period)
 TILE = 16  # planes per tile on a CPU
+EACH = 4  # cells per work-item of an update on a GPU, along x
+GROUP = (32, 4, 1)  # work-items of an update that work together on a GPU: 4 pieces of rows beside each other
 WAVE_STEPS = 64  # steps of the incident wave that are on the device at a time: a multiple of BLOCK
 VECTORS = 16  # vectors per work-item of a transform on a CPU
 ITEMS = 4096  # work-items of a transform on a GPU
@@ -70,6 +73,8 @@ class Fields:
             )
             for name in ("update_e", "update_h")
         ]
+        allowed = min(map(device.max_group, self._update))
+        self._group = None if self._rows_are_items or allowed < prod(GROUP) else GROUP
         self._edges, self._faces, self._enter, self._transform = (
             device.kernel("fdtd_lists.cl", name, LANES=self.lanes)
             for name in ("edges", "faces", "incident", "transform")
@@ -128,19 +133,23 @@ class Fields:
         enters = {"u_at": now * COMPONENTS * points if wave else 0, "n_points": points, **heard(loud)}
         sample = step // self._every % SAMPLES if (step + 1) % self._every == 0 else None
         vectors = grid.shape[2] // self.lanes
-        columns, each, groups = (1, ROWS, grid.groups) if self._rows_are_items else (vectors, 1, grid.shape[1])
+        each: int = ROWS
+        size: tuple[int, ...] = (1, grid.groups, planes[1] - planes[0])
+        if not self._rows_are_items:
+            each, items = EACH, (vectors, grid.shape[1], -(-(planes[1] - planes[0]) // EACH))
+            size = tuple(-(-n // group) * group for n, group in zip(items, self._group or (1, 1, 1), strict=True))
         lists: tuple[Any, ...] = ()
         if self._rows_are_items:
             lists = entrance.rows, *entrance.arrays, self._wave_values, part.rows, *part.arrays
         self.device.run(
-            self._update[magnetic], (columns, groups, planes[1] - planes[0]), None,
+            self._update[magnetic], size, self._group,
             launch_numbers(
                 "fdtd_vacuum.cl", "update", thick=self._thickness, component=grid.component, start=grid.start,
                 plane=grid.plane, row=grid.row, n_planes=grid.shape[0], n_rows=grid.shape[1], n_vectors=vectors,
-                rows_each=each, first=planes[0], s=COURANT, front=self._front[now] if self._dark else np.inf,
+                each=each, first=planes[0], last=planes[1], s=COURANT, front=self._front[now] if self._dark else np.inf,
                 along=self._travel, wave=loud != SILENT, conducts=part.conducts, **enters, **part.numbers(sample),
             ),
-            self.e, self.h, *self._layers[magnetic], self._resting, *lists,
+            self.e, self.h, *self._layers[magnetic], self._resting, *lists, steps=each,
         )  # fmt: skip
         if not self._rows_are_items:
             for first, last in entrance.spans(planes) if loud != SILENT else ():
