@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +14,9 @@ from .equations import excess_delay, triangle_nodes
 from .lit_part import area, cut_away, intersection, plane_axes, shadow
 
 LEAST_AREA = 1e-12  # of a facet: smaller polygons are rounding
+WINDOW_BOW = 1e-4  # wavelengths: distance of the edge of a window from a straight line over a triangle
+BISECTIONS = 30  # of a side that crosses the edge of a window
+NO_WINDOW = (-np.inf, np.inf)
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,10 +65,12 @@ def bounce_echo(
     bounces: int,
     up: tuple[float, float, float] = UP,
     on_plane: float = 1e-9,
+    window: tuple[float, float] = NO_WINDOW,
 ) -> np.ndarray:
     """Echoes of 1, 2 ... `bounces` reflections, m complex128 (bounces, n_f, 2, 2): every sequence of facets.
 
     tx, rx  m (3,);  reference_range  m;  on_plane  m: corners nearer to a plane lie in it
+    window  least and greatest half path about the reference range, m: places of the last facet beyond it are left out
 
     Flat facets i, j ... l reflect geometrically; the last one, m, radiates by physical optics:
         k/(2 sqrt(pi)) integral of S(x) J(x) exp(-j k (|x - T'| + |x - R| - 2 R_ref)) dA,   T' = M_l ... M_j M_i T
@@ -76,7 +81,9 @@ def bounce_echo(
     for order in range(bounces):
         beams = [beam for old in beams for k in range(len(scene.triangles)) if (beam := _onto(scene, old, k, on_plane))]
         for beam in beams:
-            out[order] += _echo(scene, beam, frequencies, np.asarray(rx, float), reference_range, up, on_plane)
+            for triangle in _seen(scene, beam, np.asarray(rx, float), on_plane):
+                for part in _within(triangle, beam.image, rx, reference_range, window, max(frequencies)):
+                    out[order] += _triangle_echo(scene, beam, part, frequencies, rx, reference_range, up)
     return out
 
 
@@ -124,17 +131,9 @@ def _shadows(facet: np.ndarray, others: list[np.ndarray], eye: np.ndarray, on_pl
     return [one for one in shadows if len(one) and area(one) > 0]
 
 
-def _echo(
-    scene: Reflectors,
-    beam: _Beam,
-    frequencies: np.ndarray,
-    rx: np.ndarray,
-    reference_range: float,
-    up: tuple[float, float, float],
-    on_plane: float,
-) -> np.ndarray:
-    """Echo of what a beam lights on its last facet, of the part that the receiver sees: complex128 (n_f, 2, 2)."""
-    k, out = beam.facets[-1], np.zeros((len(frequencies), 2, 2), complex)
+def _seen(scene: Reflectors, beam: _Beam, rx: np.ndarray, on_plane: float) -> Iterator[np.ndarray]:
+    """Triangles, m (3, 3), of what a beam lights on its last facet: the part that the receiver sees."""
+    k = beam.facets[-1]
     facet, normal = scene.triangles[k], beam.normals[-1]
     axes, center = plane_axes(facet), facet.mean(axis=0)
     pieces = [(polygon - center) @ axes[:2].T for polygon in beam.polygons]
@@ -145,9 +144,59 @@ def _echo(
         for i in range(1, len(piece) - 1):
             corners = piece[[0, i, i + 1]]
             if area(corners) > LEAST_AREA * area((facet - center) @ axes[:2].T):
-                triangle = center + corners @ axes[:2]
-                out += _triangle_echo(scene, beam, triangle, frequencies, rx, reference_range, up)
-    return out
+                yield center + corners @ axes[:2]
+
+
+def _within(
+    triangle: np.ndarray,
+    image: np.ndarray,
+    rx: np.ndarray,
+    reference_range: float,
+    window: tuple[float, float],
+    frequency: float,
+) -> Iterator[np.ndarray]:
+    """Triangles that are together the part of one, m (3, 3), inside a range window: cut where its sides cross the
+    window's edge, and halved before until the edge is straight."""
+
+    def half_path(place: np.ndarray) -> float:
+        return (
+            float(np.sqrt(((place - image) ** 2).sum())) + float(np.sqrt(((place - rx) ** 2).sum()))
+        ) / 2 - reference_range
+
+    sides = np.linalg.norm(np.roll(triangle, -1, axis=0) - triangle, axis=1)
+    middle, reach = half_path(triangle.mean(axis=0)), sides.max()
+    if window[0] <= middle - reach and middle + reach <= window[1]:
+        yield triangle
+    elif middle + reach >= window[0] and middle - reach <= window[1]:
+        distance = min(np.linalg.norm(triangle - end, axis=1).min() for end in (image, rx))
+        if sides.max() ** 2 > 8 * distance * WINDOW_BOW * SPEED_OF_LIGHT / frequency:
+            i = int(sides.argmax())
+            half = triangle[[i, (i + 1) % 3]].mean(axis=0)
+            for start in (i, (i + 1) % 3):
+                part = triangle.copy()
+                part[start] = half
+                yield from _within(part, image, rx, reference_range, window, frequency)
+            return
+        polygon = triangle
+        polygon = _cut(polygon, lambda places: half_path(places) - window[0])
+        polygon = _cut(polygon, lambda places: window[1] - half_path(places))
+        yield from (polygon[[0, i, i + 1]] for i in range(1, len(polygon) - 1))
+
+
+def _cut(polygon: np.ndarray, height: Callable[[np.ndarray], float]) -> np.ndarray:
+    """The part of a convex polygon, m (n, 3), of which `height` of places, m (3,), is at least 0: (k, 3)."""
+    corners = []
+    for one, other in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
+        first, last = height(one), height(other)
+        if first >= 0:
+            corners.append(one)
+        if (first >= 0) != (last >= 0):
+            low, high = (one, other) if first >= 0 else (other, one)
+            for _ in range(BISECTIONS):
+                middle = (low + high) / 2
+                low, high = (middle, high) if height(middle) >= 0 else (low, middle)
+            corners.append(low)
+    return np.array(corners).reshape(-1, 3)
 
 
 def _triangle_echo(

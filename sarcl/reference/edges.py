@@ -28,6 +28,7 @@ def edge_echo(
     up: tuple[float, float, float] = UP,
     seen: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None,
     per_wavelength: float = 20,
+    window: tuple[float, float] = (-np.inf, np.inf),
 ) -> np.ndarray:
     """Echo of one edge of a conductor, complex128 (n_f, 2, 2) [r, t], m: 0 is H and 1 is V.
 
@@ -35,6 +36,7 @@ def edge_echo(
     antennas  places of transmitter and receiver, m (3,) each;  reference_range  m
     seen  (places, antenna) -> whether it sees them (n,); None: it does
     per_wavelength  elements, each a plane wave with the directions and the path of its own middle
+    window  least and greatest half path about the reference range, m, of the elements that count
     """
     (tx, rx), way = antennas, ends[1] - ends[0]
     n = int(np.linalg.norm(way) * per_wavelength * frequencies.max() / SPEED_OF_LIGHT) + 1
@@ -51,6 +53,7 @@ def edge_echo(
     if seen is not None:
         matrix *= (seen(places, tx) & seen(places, rx))[:, None, None]
     path = np.linalg.norm(places - tx, axis=1) + np.linalg.norm(places - rx, axis=1) - 2 * reference_range
+    matrix *= ((path >= 2 * window[0]) & (path <= 2 * window[1]))[:, None, None]
     k = 2 * np.pi * frequencies / SPEED_OF_LIGHT
     turn = ((looks[0] + looks[1]) @ way / n)[:, None] * k
     wave = np.exp(-1j * k * path[:, None]) * np.sinc(turn / (2 * np.pi)) * np.linalg.norm(way) / n
@@ -101,6 +104,7 @@ def border_echo(
     up: tuple[float, float, float] = UP,
     seen: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None,
     per_wavelength: float = 20,
+    window: tuple[float, float] = (-np.inf, np.inf),
 ) -> np.ndarray:
     """Echo of the waves between two borders of a face, both ways, complex128 (n_f, 2, 2) [r, t], m.
 
@@ -116,8 +120,10 @@ def border_echo(
         g, k = unit((other - one).sum(axis=0)), 2 * np.pi * frequencies[:, None] / SPEED_OF_LIGHT
         length = np.linalg.norm(other - one, axis=1)
         path = np.linalg.norm(one - antennas[0], axis=1) + length + np.linalg.norm(other - antennas[1], axis=1)
-        phase = k * (path - 2 * reference_range)
+        path -= 2 * reference_range
+        phase = k * path
         wave = np.exp(-1j * phase[:, 1::2]) * np.sinc((phase[:, 2::2] - phase[:, :-1:2]) / (2 * np.pi)) * size
+        wave *= (path[1::2] >= 2 * window[0]) & (path[1::2] <= 2 * window[1])
         one, other, phase = one[1::2], other[1::2], k * length[1::2]
         fields, detours, factor = [], [], 1j * np.sqrt(phase / (2 * np.pi))
         ends = zip((one, other), antennas, faces[:2], faces[3:], (g, -g), strict=True)

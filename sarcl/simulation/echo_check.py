@@ -161,11 +161,11 @@ def _exact(part: Points | FacetSet, view: ChannelView, p: int) -> tuple[np.ndarr
 def _bounced(scene: BounceScene, view: ChannelView, pulse: int) -> np.ndarray:
     """Samples (n_polarizations, n) of a pulse of what facets reflect to one another: by the reference, of few facets
     without antennas' weights, and otherwise by the beams themselves, each added at every frequency."""
-    from ..reference.bounces import Reflectors, bounce_echo
+    from ..reference.bounces import NO_WINDOW, Reflectors, bounce_echo
 
     antennas, surfaces, coatings = view.antennas, scene.surfaces, scene.coatings
-    values, counts = BounceSpreader(scene, view).values(np.array([pulse]), view.frequencies, exact=True)
-    if len(scene.mirrors) > MOST_REFLECTORS or view.weights.is_needed or counts.outside_window or surfaces.ground:
+    values, _ = BounceSpreader(scene, view).values(np.array([pulse]), view.frequencies, exact=True)
+    if len(scene.mirrors) > MOST_REFLECTORS or view.weights.is_needed or surfaces.ground:
         return np.asarray(values[0])
     eps = np.stack([coatings.permittivity(f)[coatings.material] for f in view.frequencies.tolist()])
     reflectivity = coatings.reflectivity * surfaces.mirrors
@@ -178,6 +178,7 @@ def _bounced(scene: BounceScene, view: ChannelView, pulse: int) -> np.ndarray:
         bounces=scene.bounces,
         up=tuple(view.vertical.tolist()),
         on_plane=scene.surfaces.on_plane,
+        window=(float(antennas.near[pulse]), float(antennas.far[pulse])) if view.gated else NO_WINDOW,
     )[1:].sum(axis=0)
     return np.stack([sums[:, "HV".index(name[0]), "HV".index(name[1])] for name in view.polarizations])
 

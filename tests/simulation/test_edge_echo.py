@@ -12,6 +12,7 @@ from sarcl.scene.wedges import wedges
 
 CHIRP = Waveform.chirp(center=9.6e9, bandwidth=300e6, duration=1e-6)
 NEAR = {"reference": (0, 0, 0), "range_window": (-3, 3), "polarization": ("HH", "HV", "VV"), "check": False}
+ACROSS = (-3.0, 0.04), True  # a range window that ends on edges, m, seen by two antennas
 
 
 def around(distance, n=4, incidence=0.9, azimuth=0.4, arc=0.02):
@@ -27,13 +28,14 @@ def edges_alone(scene, track, *, tolerance=1e-3, **options):
 
     Edges have a fifth of the tolerance, facets the rest of the sum of squares: the same facets are added in both calls.
     """
-    both = sarcl.echo(scene, CHIRP, track, edges=True, tolerance=tolerance, **NEAR, **options)
-    without = sarcl.echo(scene, CHIRP, track, tolerance=tolerance * np.sqrt(1 - 0.2**2), **NEAR, **options)
+    options = {**NEAR, **options}
+    both = sarcl.echo(scene, CHIRP, track, edges=True, tolerance=tolerance, **options)
+    without = sarcl.echo(scene, CHIRP, track, tolerance=tolerance * np.sqrt(1 - 0.2**2), **options)
     shape = len(track.positions), 3, both.n_samples
     return (both.samples.astype(complex) - without.samples).reshape(shape), both
 
 
-def summed(scene, raw, track, receiver=None, seen=None, per_wave=20):
+def summed(scene, raw, track, receiver=None, seen=None, per_wave=20, **window):
     """The reference: elements of a 20th of a wavelength, or as many as asked for; and the norm of the edges at random
     phases."""
     edges = wedges(scene.triangles, scene.two_sided, 0.35)
@@ -48,7 +50,7 @@ def summed(scene, raw, track, receiver=None, seen=None, per_wave=20):
     for p, (to, back) in enumerate(zip(track.positions, rx, strict=True)):
         reference = (np.linalg.norm(to) + np.linalg.norm(back)) / 2
         for echo, ends, frame in parts:
-            options = {"seen": seen, "per_wavelength": per_wave if echo is edge_echo else min(per_wave, 100)}
+            options = {"seen": seen, "per_wavelength": per_wave if echo is edge_echo else min(per_wave, 100), **window}
             one = echo(ends, tuple(frame), frequencies, (to, back), reference, **options)
             one = one.transpose(1, 2, 0)[[0, 0, 1], [0, 1, 1]]
             out[p], power = out[p] + one, power + (np.abs(one) ** 2).sum()
@@ -142,6 +144,18 @@ def test_shadows_end_where_they_fall_on_an_edge(low):
     whole, _ = summed(plate, raw, track, receiver)
     assert close(got, wanted, norm, 3e-2, raw)  # elements of the sum are seen whole or not at all: 1.5 mm
     assert np.linalg.norm(whole - wanted) > 0.1 * norm
+
+
+@pytest.mark.parametrize(("window", "bistatic"), quick_of([ACROSS], [ACROSS, ((-0.05, 0.06), False)]))
+@pytest.mark.parametrize("name", quick_of(["plate"], SCENES))
+def test_edges_count_by_their_part_inside_the_range_window(name, window, bistatic):
+    scene, track = SCENES[name], around(30.0, n=1)
+    receiver = around(40.0, n=1, incidence=0.5, azimuth=1.0) if bistatic else None
+    got, raw = edges_alone(scene, track, receiver=receiver, tolerance=1e-3, range_window=window, shadows=False)
+    wanted, norm = summed(scene, raw, track, receiver, per_wave=2000, window=window)
+    whole, _ = summed(scene, raw, track, receiver)
+    assert close(got, wanted, norm, 3e-2, raw)  # elements of the sum are inside or outside as a whole
+    assert np.linalg.norm(whole - wanted) > 0.05 * norm
 
 
 def test_edges_behind_their_own_body_are_dark():

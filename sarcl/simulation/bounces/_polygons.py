@@ -90,6 +90,13 @@ class Polygons:
         count[rows] = number
         return Polygons(out, count)
 
+    @property
+    def triangles(self) -> tuple[np.ndarray, np.ndarray]:
+        """Triangles that are together these polygons, m (n, 3, 3), and of which polygon each is a part (n,)."""
+        fans = [(i, np.flatnonzero(self.count > i + 1)) for i in range(1, self.corners.shape[1] - 1)]
+        corners = np.concatenate([self.corners[rows][:, [0, i, i + 1]] for i, rows in fans])
+        return corners, np.concatenate([rows for _, rows in fans])
+
     def edge_planes(self, apex: np.ndarray) -> np.ndarray:
         """Unit normals (k, n, 3) of planes through each edge and an apex, m (k, 3), that point inwards; 0 for edges
         without a direction. A plane holds the corner at which its edge begins."""

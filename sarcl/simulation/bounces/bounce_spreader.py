@@ -205,8 +205,8 @@ class BounceSpreader:
             for rows in self._pieces_at_once(lit, rx):
                 triangles = self._facets(lit.beams, lit.pieces[np.arange(rows.start, rows.stop)], lit.of[rows], rx)
                 inside = self._inside(triangles, pulses)
-                hidden = np.setdiff1d(triangles.of, triangles.of[inside])
-                self._add(echo, pulses, frequencies, triangles.chosen(inside), exact)
+                hidden = np.setdiff1d(triangles.of, inside.of)
+                self._add(echo, pulses, frequencies, inside, exact)
                 if len(hidden):
                     power, last = self._late(triangles, hidden, pulses)
                     outside, late, latest = outside + len(hidden), late + power, max(latest, last)
@@ -238,10 +238,8 @@ class BounceSpreader:
 
     def _facets(self, beams: Beams, pieces: Polygons, of: np.ndarray, rx: np.ndarray) -> Facets:
         """Triangles that are together the pieces of beams, small enough for plane waves."""
-        corners = pieces.corners
-        fans = [(i, np.flatnonzero(pieces.count > i + 1)) for i in range(1, corners.shape[1] - 1)]
-        triangles = np.concatenate([corners[rows][:, [0, i, i + 1]] for i, rows in fans])
-        of = np.concatenate([of[rows] for _, rows in fans])
+        triangles, piece = pieces.triangles
+        of = of[piece]
         parts, numbers = [], []
         while len(triangles):
             center = triangles.mean(axis=1)
@@ -257,13 +255,31 @@ class BounceSpreader:
         of = np.concatenate(numbers)
         return Facets(np.concatenate(parts), beams[of], rx[beams.pulse[of]], of)
 
-    def _inside(self, facets: Facets, pulses: np.ndarray) -> np.ndarray:
-        """Numbers of the triangles inside the range window."""
+    def _inside(self, facets: Facets, pulses: np.ndarray) -> Facets:
+        """The triangles inside the range window, and the parts inside of those on which it ends: there along lines of
+        constant half path, which is linear over a triangle as its phase is."""
         if not self.view.gated:
-            return np.arange(len(facets))
+            return facets
         antennas, row = self.view.antennas, pulses[facets.beams.pulse]
-        delta = facets.path / 2 - antennas.reference_range[row]
-        return np.flatnonzero((delta >= antennas.near[row]) & (delta <= antennas.far[row]))
+        delta, reach = facets.path / 2 - antennas.reference_range[row], facets.widest / 2
+        from_near, to_far = delta - antennas.near[row], antennas.far[row] - delta
+        least = np.minimum(from_near, to_far)
+        at_edge = np.flatnonzero((least > -reach) & (least < reach))
+        is_inside = least >= 0
+        is_inside[at_edge] = False
+        whole = np.flatnonzero(is_inside)
+        if not len(at_edge):
+            return facets.chosen(whole)
+        parts = Polygons.of(facets.triangles[at_edge])
+        for sign, left in ((-0.5, from_near), (0.5, to_far)):
+            rise = np.einsum("nij,nj->ni", parts.corners - facets.center[at_edge, None], sign * facets.both[at_edge])
+            parts = parts.clipped(left[at_edge, None] + rise)
+        triangles, part = parts.triangles
+        rows = np.concatenate([whole, at_edge[part]])
+        order = np.argsort(rows, kind="stable")  # beams in rising order
+        corners = np.concatenate([facets.triangles[whole], triangles])[order]
+        rows = rows[order]
+        return Facets(corners, facets.beams[rows], facets.rx[rows], facets.of[rows])
 
     def _late(self, triangles: Facets, beams: np.ndarray, pulses: np.ndarray) -> tuple[float, float]:
         """Power of beams of these numbers (n,) in a sample, and the latest half path about the reference, m."""

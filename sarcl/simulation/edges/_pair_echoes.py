@@ -11,7 +11,7 @@ from ...base.vectors import dot, unit
 from ...scattering.double_diffraction import double_matrix
 from ..spreading import ChannelView
 from ._border_pairs import BorderPairs, Rays
-from ._paths import paths_over, weigh
+from ._paths import common_part, paths_over, weigh, within_window
 
 
 class PairEchoes:
@@ -45,11 +45,10 @@ class PairEchoes:
             begin, end = path[:, first], path[:, first + 1]
             away = (begin + end) / 2
             part, factor = pairs.seen(rays, lights)
+            if view.gated:
+                part = common_part([part, within_window(begin, end, view.antennas, pulses)])
             factor = factor * ((rays.high - rays.low) / pairs.parts)[:, pairs.pair] * (part[..., 1] - part[..., 0])
             factor, part = np.broadcast_to(factor, away.shape), np.broadcast_to(part, (*away.shape, 2))
-            if view.gated:
-                near, far = view.antennas.near[pulses, None], view.antennas.far[pulses, None]
-                factor = factor * ((away >= near) & (away <= far))
             pulse, piece = np.nonzero(factor)
             matrix = self._matrices(pairs, places, side, rays, pulse, piece, frequencies)
             phase = 2 * np.pi / SPEED_OF_LIGHT * frequencies * (2 * (begin - end)[pulse, piece])[:, None]

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+from functools import reduce
+
 import numpy as np
 
+from ...numerics.pulse_geometry import PulseGeometry
 from ...scattering.antenna_weights import AntennaWeights
+
+LEAST_STEP = 1e-300  # m: of pieces all at one range
+WHOLE = np.array([0.0, 1.0])  # of a piece of an edge, from its beginning to its end
 
 
 def paths_over(ends: list[np.ndarray], points: list[np.ndarray], reference: np.ndarray) -> np.ndarray:
@@ -45,3 +51,17 @@ def weigh(
         for m, f in enumerate(frequencies.tolist()):
             weight = weights.weights(places[rows], int(pulses[p]), f)
             amplitudes[rows, ..., m] = (amplitudes[rows, ..., m].T * weight).T
+
+
+def within_window(begin: np.ndarray, end: np.ndarray, antennas: PulseGeometry, pulses: np.ndarray) -> np.ndarray:
+    """The part of pieces of edges inside the range windows of pulses (p,): shares of their lengths where it begins and
+    ends, (p, n, 2), equal where there is none. begin, end  half paths about the reference range, m (p, n)"""
+    step = np.where(end == begin, LEAST_STEP, end - begin)
+    limits = [np.clip((limit[pulses, None] - begin) / step, 0.0, 1.0) for limit in (antennas.near, antennas.far)]
+    return np.sort(np.stack(limits, axis=-1), axis=-1)
+
+
+def common_part(parts: list[np.ndarray]) -> np.ndarray:
+    """Where the intervals begin and end that parts (..., 2) have in common; equal where there is none."""
+    begin = reduce(np.maximum, [part[..., 0] for part in parts])
+    return np.stack([begin, np.maximum(reduce(np.minimum, [part[..., 1] for part in parts]), begin)], axis=-1)

@@ -23,7 +23,7 @@ from ..spreading import ChannelView, Counts
 from ._border_pairs import BorderPairs
 from ._edge_pieces import EdgeKnots, EdgeLight, EdgePieces, edge_pieces, longest_piece
 from ._pair_echoes import PairEchoes
-from ._paths import paths_over, weigh
+from ._paths import WHOLE, common_part, paths_over, weigh, within_window
 
 # Errors of amplitudes that are interpolated over the band between 1, 2, ... frequencies, x^m/(m! 2^(m - 1)), where
 # x = pi/8 for pieces of a quarter of a resolution cell
@@ -195,12 +195,12 @@ class EdgeEchoes:
         paths = paths_over(ends, [pieces.corners] * len(ends), antennas.reference_range[pulses])
         begin, end = paths[:, pieces.first], paths[:, pieces.first + 1]
         away = (begin + end) / 2
-        near, far = antennas.near[pulses, None], antennas.far[pulses, None]
-        inside = (away >= near) & (away <= far) if view.gated else np.ones(away.shape, bool)
         alone = None if self.light is None else [self.light.lit(places) for places in ends]
-        lit = np.broadcast_to([0.0, 1.0], (*away.shape, 2)) if alone is None else _common(alone)
-        pulse, piece = np.nonzero(inside & (lit[..., 1] > lit[..., 0]))
-        counts = Counts(inside.size, int((~inside).sum()), int(inside.sum()) - len(pulse))
+        inside = within_window(begin, end, antennas, pulses) if view.gated else np.broadcast_to(WHOLE, (*away.shape, 2))
+        lit = common_part([inside, *(alone or [])])
+        n_inside = int((inside[..., 1] > inside[..., 0]).sum())
+        pulse, piece = np.nonzero(lit[..., 1] > lit[..., 0])
+        counts = Counts(away.size, away.size - n_inside, n_inside - len(pulse))
         lit, edge = lit[pulse, piece], pieces.edge[piece]
         part, middle = lit[:, 1] - lit[:, 0], lit.sum(axis=1) / 2
         share = pieces.corner_share[pieces.first[piece]] + middle / pieces.parts[edge]
@@ -236,12 +236,6 @@ class EdgeEchoes:
         before, after, weight = knots.around(edge, share)
         first, second = values[number[pulse, before]], values[number[pulse, after]]
         return np.asarray(first + weight[:, None] * (second - first))
-
-
-def _common(parts: list[np.ndarray]) -> np.ndarray:
-    """Where the intervals begin and end that parts (..., 2) have in common; equal where there is none."""
-    begin = np.maximum.reduce([part[..., 0] for part in parts])
-    return np.stack([begin, np.maximum(np.minimum.reduce([part[..., 1] for part in parts]), begin)], axis=-1)
 
 
 def _summed(amplitudes: np.ndarray, delays: np.ndarray, frequencies: np.ndarray) -> np.ndarray:

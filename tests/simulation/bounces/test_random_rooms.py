@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from helpers.cases import quick_of
 
 import sarcl
 from sarcl.reference.bounces import bounce_echo, reflectors
@@ -32,13 +33,16 @@ def room(seed: int) -> tuple[sarcl.Scene, sarcl.Trajectory, sarcl.Trajectory | N
     return scene, sarcl.Trajectory(None, distance * look[None]), receiver if seed % 2 else None
 
 
-def exact(scene: sarcl.Scene, raw: sarcl.PhaseHistory) -> tuple[np.ndarray, float]:
+def exact(
+    scene: sarcl.Scene, raw: sarcl.PhaseHistory, window: tuple[float, float] = WINDOW
+) -> tuple[np.ndarray, float]:
     """Samples (4, n) of up to three reflections, and their norm where those of 1, 2 and 3 add at random phases."""
     f = raw.frequency[0] + raw.frequency_step[0] * np.arange(raw.n_samples)
     on_plane = 1e-6 * float(np.linalg.norm(np.ptp(scene.triangles.reshape(-1, 3), axis=0)))
     orders = bounce_echo(
-        reflectors(scene, f), f, raw.tx[0], raw.rx[0], raw.reference_range[0], bounces=3, on_plane=on_plane
-    )
+        reflectors(scene, f), f, raw.tx[0], raw.rx[0], raw.reference_range[0], bounces=3, on_plane=on_plane,
+        window=window,
+    )  # fmt: skip
     spectrum = WAVE.pulse_spectrum(f)
     orders = orders.reshape(3, len(f), 4).swapaxes(1, 2) * np.abs(spectrum) ** 2
     return orders.sum(axis=0), float(np.linalg.norm(orders))
@@ -62,15 +66,16 @@ def bodies(seed: int) -> tuple[sarcl.Scene, sarcl.Trajectory, sarcl.Trajectory |
 
 
 def check(
-    scene: sarcl.Scene, track: sarcl.Trajectory, receiver: sarcl.Trajectory | None, tolerances: tuple[float, ...]
-) -> None:
+    scene: sarcl.Scene, track: sarcl.Trajectory, receiver: sarcl.Trajectory | None, tolerances: tuple[float, ...],
+    window: tuple[float, float] = WINDOW,
+) -> None:  # fmt: skip
     truth: tuple[np.ndarray, float] | None = None
     for tolerance in tolerances:
         raw = sarcl.echo(
-            scene, WAVE, track, receiver=receiver, bounces=3, polarization="all", range_window=WINDOW,
+            scene, WAVE, track, receiver=receiver, bounces=3, polarization="all", range_window=window,
             tolerance=tolerance, check=False,
         )  # fmt: skip
-        truth = truth or exact(scene, raw)
+        truth = truth or exact(scene, raw, window)
         error = np.linalg.norm(raw.samples - truth[0]) / max(np.linalg.norm(truth[0]), truth[1])
         assert error <= raw.report.predicted_error <= tolerance
 
@@ -83,6 +88,13 @@ def test_a_random_room_is_within_the_tolerance(seed):
 @pytest.mark.parametrize("seed", [1, 2])
 def test_closed_bodies_on_ground_are_within_the_tolerance(seed):
     check(*bodies(seed), (1e-3,))
+
+
+@pytest.mark.parametrize("seed", quick_of([1], range(1, 31)))
+def test_a_range_window_may_end_on_what_facets_reflect_to_one_another(seed):
+    """Windows that end between the delays of one reflection and of two, and within them."""
+    low, width = np.random.default_rng(seed).uniform((-0.8, 0.3), (0.6, 2.0))
+    check(*room(seed), TOLERANCES[1:], window=(low, low + width))
 
 
 @pytest.mark.slow
