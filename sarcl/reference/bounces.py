@@ -69,7 +69,8 @@ def bounce_echo(
 
     Flat facets i, j ... l reflect geometrically; the last one, m, radiates by physical optics:
         k/(2 sqrt(pi)) integral of S(x) J(x) exp(-j k (|x - T'| + |x - R| - 2 R_ref)) dA,   T' = M_l ... M_j M_i T
-    over what the beam lights of m and R sees. J: what the reflections do to fields of H and V.
+    over what the beam lights of m and R sees. J: what the reflections do to fields of H and V. Where R = T, HV and
+    VH are their mean, by reciprocity: the last facet radiates unlike the others, hence a reversed sequence differs.
     """
     out = np.zeros((bounces, len(frequencies), 2, 2), complex)
     beams = [_Beam((), (), np.asarray(tx, float), [])]
@@ -77,7 +78,7 @@ def bounce_echo(
         beams = [beam for old in beams for k in range(len(scene.triangles)) if (beam := _onto(scene, old, k, on_plane))]
         for beam in beams:
             out[order] += _echo(scene, beam, frequencies, np.asarray(rx, float), reference_range, up, on_plane)
-    return out
+    return (out + out.swapaxes(-1, -2)) / 2 if np.array_equal(tx, rx) else out
 
 
 def _onto(scene: Reflectors, beam: _Beam, k: int, on_plane: float) -> _Beam | None:
