@@ -74,7 +74,8 @@ def bounce_echo(
 
     Flat facets i, j ... l reflect geometrically; the last one, m, radiates by physical optics:
         k/(2 sqrt(pi)) integral of S(x) J(x) exp(-j k (|x - T'| + |x - R| - 2 R_ref)) dA,   T' = M_l ... M_j M_i T
-    over what the beam lights of m and R sees. J: what the reflections do to fields of H and V.
+    over what the beam lights of m and R sees. J: what the reflections do to fields of H and V. Where R = T, HV and
+    VH are their mean, by reciprocity: the last facet radiates unlike the others, hence a reversed sequence differs.
     """
     out = np.zeros((bounces, len(frequencies), 2, 2), complex)
     beams = [_Beam((), (), np.asarray(tx, float), [])]
@@ -84,7 +85,7 @@ def bounce_echo(
             for triangle in _seen(scene, beam, np.asarray(rx, float), on_plane):
                 for part in _within(triangle, beam.image, rx, reference_range, window, max(frequencies)):
                     out[order] += _triangle_echo(scene, beam, part, frequencies, rx, reference_range, up)
-    return out
+    return (out + out.swapaxes(-1, -2)) / 2 if np.array_equal(tx, rx) else out
 
 
 def _onto(scene: Reflectors, beam: _Beam, k: int, on_plane: float) -> _Beam | None:

@@ -129,6 +129,12 @@ class AntennaWeights:
         return self.geometry.is_monostatic and np.array_equal(*self.axes)
 
     @property
+    def is_same_both_ways(self) -> bool:
+        """Whether a path has the weight of the same path the other way round, where both antennas stand in one place:
+        without gains, with a two-way pattern, or with one antenna that transmits and receives."""
+        return len(self.patterns) < 2 or self.is_two_way
+
+    @property
     def peak(self) -> float:
         """Largest two-way gain, an amplitude."""
         return float(np.prod([one.amplitude for one in self.patterns]))

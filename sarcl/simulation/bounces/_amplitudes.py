@@ -5,6 +5,7 @@
 u_t', u_r  from the last facet to the transmitter's image and to the receiver; A, rho  area and places of a triangle
 J          fields H and V of the wave that arrives at the last facet, for H and V that were sent: each facet before it
            reflects the field across its plane of incidence by R_h, the magnetic field across it by R_v
+           One antenna that sends and receives alike: HV and VH are equal by reciprocity, and both are their mean
 rho_i      reflectivity, and what roughness leaves: exp(-(2 k h cos t)^2/2), at the last facet exp(-(q.n h)^2/2)
 source     docs/theory/bounces.md; scattering/physical_optics for S, R_h and R_v
 """
@@ -136,9 +137,17 @@ class Facets:
         return np.asarray(out)
 
     def matrices(
-        self, frequency: float, coatings: Coatings, polarizations: Sequence[str], up: np.ndarray
+        self,
+        frequency: float,
+        coatings: Coatings,
+        polarizations: Sequence[str],
+        up: np.ndarray,
+        is_reciprocal: np.ndarray,
     ) -> np.ndarray:
-        """Matrix of the amplitude S J at one frequency, in polarisations: complex128 (n, n_polarizations)."""
+        """Matrix of the amplitude S J at one frequency, in polarisations: complex128 (n, n_polarizations).
+
+        is_reciprocal  triangles (n,) of which HV and VH are their mean: the sum with the path the other way round
+        """
         eps, upward = coatings.permittivity(frequency)[coatings.material[self.chains]], tuple(up.tolist())
         rays, normals = self.rays(), self.normals
         fields = [field.astype(complex) for field in polarisation(rays[0], upward)]
@@ -149,6 +158,7 @@ class Facets:
         basis = polarisation(rays[-1], upward)
         arriving = np.stack([np.stack([(b * f).sum(axis=1) for f in fields], axis=-1) for b in basis], axis=-2)
         matrix = (parts[0] + r_h * parts[1] + r_v * parts[2]) @ arriving
+        matrix = np.where(is_reciprocal[:, None, None], (matrix + matrix.swapaxes(1, 2)) / 2, matrix)
         return np.stack([matrix[:, "HV".index(name[0]), "HV".index(name[1])] for name in polarizations], axis=-1)
 
 

@@ -316,7 +316,9 @@ class BounceSpreader:
     def _weighted(self, facets: Facets, pulses: np.ndarray, frequency: float) -> np.ndarray:
         """Matrices of triangles times the weights of the antennas, complex128 (n, n_polarizations)."""
         view, beams = self.view, facets.beams
-        out = facets.matrices(frequency, self._coatings, view.polarizations, view.vertical)
+        numbers, antennas = pulses[beams.pulse], view.antennas
+        is_reciprocal = view.weights.is_same_both_ways & (antennas.tx[numbers] == antennas.rx[numbers]).all(axis=1)
+        out = facets.matrices(frequency, self._coatings, view.polarizations, view.vertical, is_reciprocal)
         if not view.weights.is_needed:
             return out
         leaving = facets.rays()[0] * np.linalg.norm(facets.center - beams.apex, axis=1)[:, None]

@@ -60,3 +60,21 @@ def test_beams_that_end_on_a_plate_weigh_each_part_of_it(aim, tolerance):
     expected = currents_on_both_plates(position, [a.axes(track)[0] for a in (SENDS, RECEIVES)])
     error = abs((two - one)[len(one) // 2] - expected)
     assert error < max(tolerance, 2e-3) * abs(expected)  # the sum over places: 1e-3, at outlines of beams
+
+
+def test_antennas_that_differ_keep_the_cross_polarisation_of_each_way():
+    """HV and VH of one antenna are equal; of two in one place each is that of antennas 1 um apart."""
+    look = np.array([0.5, 0.55, 0.67])
+    track = sarcl.pointing.spotlight(sarcl.Trajectory(None, DISTANCE * look[None]), (0.2, 0.1, 0.15))
+    beside = sarcl.pointing.spotlight(sarcl.Trajectory(None, track.positions + 1e-6), (0.2, 0.1, 0.15))
+    options = {
+        "antenna": (SENDS, RECEIVES), "polarization": "all", "reference": (0, 0, 0),
+        "range_window": (-30, 30), "tolerance": 1e-1, "check": False, "bounces": 3,
+    }  # fmt: skip
+    together, apart, alike = (
+        sarcl.echo(shapes.trihedral(SIDE), CHIRP, track, **options | changes).samples[1:3]
+        for changes in ({}, {"receiver": beside}, {"antenna": SENDS})
+    )
+    assert np.linalg.norm(together - apart) < 1e-3 * np.linalg.norm(apart)
+    assert np.linalg.norm(together[0] - together[1]) > 0.05 * np.linalg.norm(together)
+    assert np.linalg.norm(alike[0] - alike[1]) < 1e-5 * np.linalg.norm(alike)
