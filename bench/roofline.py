@@ -240,11 +240,16 @@ def main() -> None:
     rows = counted(asked.only, device)
     ceilings.verified(rows, device.info.vector_width)
     launches = Launches()
+    once = {(row["call"], row["file"], row["kernel"]): row.get("launches") for row in rows}
     fastest: dict[tuple[str, str, str], float] = {}
     for _ in range(asked.rounds + 1):  # the first round builds kernels
         for name, call in chosen(asked.only).items():
             for row in launches.of(call, device):
                 key = name, row["file"], row["kernel"]
+                if row.get("launches") != once.get(key):
+                    raise RuntimeError(
+                        f"{key} is launched {row.get('launches')} times, but {once.get(key)} when counted"
+                    )
                 fastest[key] = min(fastest.get(key, np.inf), row["cpu_seconds"])
     for row in rows:
         row["cpu_seconds"] = fastest[row["call"], row["file"], row["kernel"]]
