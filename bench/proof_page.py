@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import proof_pictures
+import roofline_page
 
 from sarcl.bench import ratios, tables
 
@@ -26,9 +27,8 @@ points, channels and images are compared with sums in float64 or extended precis
 `check=True`, which computes them again in float64. A ratio of 1 is the tolerance. "Refused": sarcl
 says before the computation what cannot be met. Tasks without an exact result, such as an image of
 nothing, do not count. `fullwave_echo` is compared with a run of the same grid at every pulse, which
-is what its tolerance bounds: bodies of 0.15 to 0.7 wavelengths, metal and dielectric, 4 to 9 pulses,
-fewer tasks because each takes seconds. Its [errors against Mie's series](../theory/full_wave.md) are
-those of the grid.
+is what its tolerance bounds: bodies of 0.15 to 0.7 wavelengths, metal and dielectric, 4 to 9 pulses.
+Its [errors against Mie's series](../theory/full_wave.md) are those of the grid.
 """
 PEERS = """Ratios are the peer's seconds over those of the fastest row of sarcl whose error is no larger:
 smallest and largest over all rows of the peer. [Images](results_images.md) and
@@ -49,11 +49,6 @@ SCALING = """One run at a tolerance of 1e-2; slopes through the logarithms of th
 """
 MEMORY = """Backprojection from and to files within `max_bytes`. "Peak" is the largest resident memory above
 that of the same process after a first small image, which loads code, driver and kernels.
-"""
-ROOFLINE = """Operations per unit are counted in the source, a multiply-add as two; bytes are those that must come
-from memory or go there. Ceilings are those of two small kernels in the same run, per CPU second. Of
-kernels by lines the innermost loop alone counts; the profiles and weights of lines are work beside
-it.
 """
 SKIPPING = """Share of all pairs of facet and pulse (or of pixel and pulse) that is not computed, by reason.
 "Without" computes the pairs of a reason after all, through `skip=` or `shadows=False`; the change
@@ -83,7 +78,7 @@ def pictures(measured: dict[str, Row]) -> Iterator[tuple[str, Callable[[], bytes
     """Names of the page's own pictures, and the functions that draw them."""
     yield "proof-contract.png", lambda: proof_pictures.contract(measured["contract"])
     yield "proof-echo-peers.png", lambda: proof_pictures.echo_peers(measured["3-echo-pocl"])
-    yield "proof-roofline.png", lambda: proof_pictures.roofline(measured["roofline"])
+    yield "proof-roofline.png", lambda: roofline_page.picture(measured["roofline"])
     yield "proof-skipping.png", lambda: proof_pictures.skipping(measured["skipping"])
 
 
@@ -201,7 +196,7 @@ def claims_of_faults(document: Row) -> list[list[str]]:
 
 def claims_of_work(measured: dict[str, Row]) -> list[list[str]]:
     """Claims of memory, kernels, and what is skipped."""
-    rows, shares = measured["memory"]["rows"], [100 * share for _, share, _ in reached(measured["roofline"])]
+    rows = measured["memory"]["rows"]
     growth, limit = rows[-1]["image_bytes"] / rows[0]["image_bytes"], measured["memory"]["max_bytes"] / 1e6
     peaks = f"images {growth:.0f} times as large: peaks of {span([peak(row) for row in rows], '.0f')} MB"
     entries = [entry for _, _, entry in skipped(measured["skipping"])]
@@ -214,7 +209,7 @@ def claims_of_work(measured: dict[str, Row]) -> list[list[str]]:
         [f"Memory of images in files, `max_bytes` {limit:.0f} MB", peaks, "[memory](#memory)"],
         [
             "Kernels use the machine",
-            f"{span(shares, '.0f')} % of the nearer ceiling",
+            roofline_page.claim(measured["roofline"]),
             "[kernels](#kernels-beside-the-ceilings-of-the-machine)",
         ],
         ["What adds nothing is not computed", skipped_pairs, "[skipping](#what-is-skipped)"],
@@ -327,36 +322,9 @@ def peak(row: Row) -> float:
     return float(row["peak_gib"]) * 2**30 / 1e6
 
 
-def reached(document: Row) -> list[tuple[Row, float, str]]:
-    """Each kernel, the larger share of the two ceilings, and the ceiling's name."""
-    out = []
-    for row in document["kernels"]:
-        rate = row["units"] / row["cpu_seconds"]
-        shares = {name: rate * row[name] / document["ceilings"][name] for name in ("operations", "bytes")}
-        nearer = max(shares, key=lambda name: shares[name])
-        out.append((row, shares[nearer], nearer))
-    return out
-
-
 def roofline(measured: dict[str, Row]) -> str:
-    document, body = measured["roofline"], []
-    for row, share, nearer in reached(document):
-        rate = row["units"] / row["cpu_seconds"] / 1e6
-        work = [f"{row['operations']:.0f}", f"{row['bytes']:.3g}", f"{rate:.0f}"]
-        body.append([f"`{row['file']}`", row["unit"], *work, f"{share:.0%} of the {nearer}", row["limit"]])
-    head = ["kernel", "unit", "operations", "bytes", "M units per CPU s", "reached", "limit"]
-    tops = document["ceilings"]
-    here = f"Here: {tops['operations'] / 1e9:.0f}e9 operations and {tops['bytes'] / 1e9:.0f}e9 bytes per CPU second. "
-    gpus = "GPUs: [instructions counted](../developers/gpu_static.md), "
-    gpus += "[H100 measured](../developers/benchmarks.md#on-a-gpu)."
-    return joined(
-        "## Kernels beside the ceilings of the machine",
-        "![kernels below the ceilings](proof-roofline.png)",
-        ROOFLINE,
-        here + gpus,
-        tables.markdown(head, body),
-        command(document["command"]),
-    )
+    document = measured["roofline"]
+    return joined(*roofline_page.section(document, command(document["command"])))
 
 
 def skipped(document: Row) -> list[tuple[str, str, Row]]:

@@ -51,25 +51,6 @@ def echo_peers(document: Row) -> bytes:
     return plots.png(drawing)
 
 
-def roofline(document: Row) -> bytes:
-    """Operations per CPU second against operations per byte, below both ceilings."""
-    drawing = plots.figure(WIDE)
-    drawing.set_layout_engine("constrained")
-    axes = drawing.add_subplot()
-    top, stream = document["ceilings"]["operations"], document["ceilings"]["bytes"]
-    x = np.geomspace(0.1, 1e3, 200)
-    axes.plot(x, np.minimum(top, stream * x) / 1e9, color="black", linewidth=2, label="ceilings: memory, multiply-adds")
-    for i, row in enumerate(document["kernels"]):
-        rate, look = row["units"] / row["cpu_seconds"] * row["operations"], plots.style(i) | {"linestyle": "none"}
-        axes.plot([row["operations"] / row["bytes"]], [rate / 1e9], label=row["file"], **look)
-    axes.set_xscale("log")
-    axes.set_yscale("log")
-    plots.decades(axes.yaxis)
-    plots.names(axes, "operations per byte", "1e9 operations per CPU second")
-    axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=9, frameon=False)
-    return plots.png(drawing)
-
-
 def skipping(document: Row) -> bytes:
     """Shares of the pairs of every scene and verb, by reason."""
     drawing = plots.figure(WIDE)

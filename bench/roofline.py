@@ -1,303 +1,268 @@
-"""Kernels beside the ceilings of this machine: operations and bytes per unit of work, and the share that is reached.
+"""Every kernel beside the ceilings of this machine: operations, bytes, the share that is reached, and what limits it.
 
-    python bench/roofline.py [--rounds 3] [--json FILE]
+    python bench/roofline.py [--rounds 3] [--only TEXT] [--json FILE]
 
-Two small kernels measure the ceilings: multiply-adds on numbers in registers, and a triad a = b + s c of arrays
-larger than caches. Then each kernel runs in a call that uses it, in turns with them; a launch is timed from an
-empty queue to an empty queue, in CPU seconds of the process, which other programs hardly affect. The best of the
-rounds counts.
+The calls are those of `sarcl bench` at one size, and some more. All of them run in a process that builds the kernels,
+in one that counts what they do (operation_counts.py), and for some rounds in one that is timed. A launch is timed from
+an empty queue to an empty queue, in CPU seconds of the process, which other programs hardly affect; the best round
+counts. Ceilings are the rates of the kernels of ceilings.py, counted and timed in the same way.
 
-Operations per unit are counted in the source, by the functions below: a multiply-add is two, integer operations and
-loads are none. Of kernels by lines the innermost loop counts alone: profiles and weights of lines are work beside
-it. Bytes per unit are those that must come from memory or go there if caches are ideal within a work-item.
+Bytes of memory are those of all buffers of a launch, once, but no more than the kernel loads and stores: what memory
+moves where caches are ideal.
 """
 
 from __future__ import annotations
 
 import argparse
+import functools
 import json
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import threading
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+import warnings
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
+import ceilings
 import numpy as np
+import operation_counts
 
 import sarcl
 from sarcl.bench.documents import header
+from sarcl.bench.verbs import TASKS
 from sarcl.fullwave.fields import Fields
 from sarcl.fullwave.lattice import LANES, Lattice
 from sarcl.fullwave.target import Target
-from sarcl.opencl import programs
 from sarcl.opencl.choose_device import open_device
 from sarcl.opencl.device import Device
+from sarcl.opencl.failures import buffer_bytes
 
+KERNELS = Path(__file__).parents[1] / "kernels"
 RESULT = Path(__file__).parents[1] / "bench" / "results" / "trials" / "roofline.json"
-CHAINS, STEPS, ITEMS = 10, 20_000, 256  # sums in registers, multiply-adds each, work-items
-TRIAD = 2**24  # float32 numbers of each of three arrays, 64 MB
-CEILINGS = """
-typedef float%(lanes)d fv;
-__kernel void multiply_add(__global float *out, int steps, float factor) {
-    fv sum[%(chains)d];
-#pragma unroll
-    for (int k = 0; k < %(chains)d; k++) sum[k] = (fv)(0.1f * k + get_global_id(0));
-    for (int n = 0; n < steps; n++) {
-#pragma unroll
-        for (int k = 0; k < %(chains)d; k++) sum[k] = fma(sum[k], (fv)factor, (fv)0.5f);
-    }
-    fv all = 0;
-#pragma unroll
-    for (int k = 0; k < %(chains)d; k++) all += sum[k];
-    vstore%(lanes)d(all, get_global_id(0), out);
-}
-__kernel void triad(__global float *a, __global const float *b, __global const float *c, float factor, int each) {
-    for (int n = 0; n < each; n++) {
-        size_t i = get_global_id(0) * (size_t)each + n;
-        vstore%(lanes)d(fma(vload%(lanes)d(i, c), (fv)factor, vload%(lanes)d(i, b)), i, a);
-    }
-}
-"""
-SINE_COSINE = 23  # operations of sincos_cycles in kernels/common.clh, as polynomials
-ROTATION = 8  # a complex product, added
-Macros = Mapping[str, int]
+TOLERANCE = 1e-2
+# n of the task of each verb in `sarcl bench`: a few CPU seconds in all
+SIZES = {
+    "echo of points": 512, "echo of facets": 64, "echo with edges": 16, "echo with bounces": 8,
+    "radar cross section": 8, "spectral echo": 1024, "channels of an array": 450, "beam of an array": 256,
+    "backproject": 1024, "polar format": 1024, "range-Doppler": 1024, "full wave": 16,
+}  # fmt: skip
+FINE = {"echo of points": (128, 1e-6), "backproject": (128, 1e-8)}  # n, and tolerance
+CELLS, TIME_STEPS = 160, 16  # side of a full-wave grid that exceeds caches, and its time steps
+Call = Callable[[Device], object]
+Measured = dict[str, float]
 
 
-def weights(macros: Macros) -> int:
-    """Operations of the weights of TAPS samples at a position: DEFINE_WEIGHTS of kernels/taps.clh."""
-    taps = macros["TAPS"]
-    return 2 if taps == 2 else 1 + 2 * taps * macros["TERMS"]
+class Launches:
+    """What kernels cost in a call: {(file, kernel): {quantity: sum over launches}}.
 
-
-def place(macros: Macros) -> int:
-    """Phase and position of a point in float32 (locate_near of kernels/range_phase.clh), and its first tap."""
-    order = macros.get("NEAR") or macros["ORDER"]
-    return 5 + (3 if order == 2 else 5) + 8 + 5
-
-
-def gathered(macros: Macros) -> float:
-    """A pulse and a pixel of kernels/backproject.cl."""
-    return place(macros) + weights(macros) + 4 * macros["TAPS"] + SINE_COSINE + ROTATION
-
-
-def of_line(macros: Macros) -> float:
-    """A pulse and a pixel in the innermost loop of kernels/backproject_lines.cl."""
-    return 8 * macros["LINE_TAPS"] * (1 + macros["SLOPE"])
-
-
-def spread_point(macros: Macros) -> float:
-    """A pulse and a point of kernels/spread_points.cl without weights of antennas."""
-    return place(macros) + weights(macros) + SINE_COSINE + 6 + 4 * macros["TAPS"]
-
-
-def spread_sample(macros: Macros) -> float:
-    """A sample of kernels/nufft2d.cl: positions, weights of both directions, and TAPS x TAPS complex sums."""
-    taps = macros["TAPS"]
-    return 2 * 8 + 2 * weights(macros) + 2 * taps + 4 * taps**2
-
-
-def updated_cell(macros: Macros) -> float:
-    """A cell and a step of both updates of kernels/fdtd_vacuum.cl: nine differences and three multiply-adds each."""
-    return 2 * (9 + 2 * 3)
-
-
-@dataclass
-class Timed:
-    """A device whose launches are timed, with the macros of its kernels.
-
-    seconds  CPU seconds by name of the kernel;  macros  of the kernel that was built last, by file
+    counters  of instrumented kernels; without them launches are timed alone
     """
 
-    device: Device
-    seconds: dict[str, float] = field(default_factory=dict)
-    macros: dict[str, dict[str, int]] = field(default_factory=dict)
+    def __init__(self, counters: operation_counts.Counters | None = None) -> None:
+        self.rows: dict[tuple[str, str], Measured] = {}
+        self._files: dict[Any, str] = {}
+        self._counters, self._lock = counters, threading.RLock()
+        self._launch, self._build = Device.run, Device.kernel
 
-    def __post_init__(self) -> None:
-        launch, build = self.device.run, self.device.kernel
+    def kernel(self, device: Device, file: str, name: str, **macros: int) -> Any:
+        """Device.kernel, which remembers the file."""
+        built = self._build(device, file, name, **macros)
+        self._files[built] = file
+        return built
 
-        def run(kernel: Any, *args: Any, **options: Any) -> None:
-            self.device.finish()
+    def run(self, device: Device, kernel: Any, *args: Any, **options: Any) -> None:
+        """Device.run, measured."""
+        with self._lock:
+            device.finish()
             start = time.process_time()
-            launch(kernel, *args, **options)
-            self.device.finish()
-            name = kernel.function_name
-            self.seconds[name] = self.seconds.get(name, 0.0) + time.process_time() - start
+            self._launch(device, kernel, *args, **options)
+            device.finish()
+            cost = {"cpu_seconds": time.process_time() - start, "launches": 1.0}
+            if self._counters is not None:
+                counts = self._counters.take()
+                cost |= counts | {"memory": min(counts["bytes"], float(buffer_bytes(args[2:])))}
+            row = self.rows.setdefault((self._files.get(kernel, ceilings.FILE), kernel.function_name), {})
+            for name, value in cost.items():
+                row[name] = row.get(name, 0.0) + value
 
-        def kernel(file: str, name: str, **macros: int) -> Any:
-            self.macros[file] = macros
-            return build(file, name, **macros)
-
-        self.device.run, self.device.kernel = run, kernel  # type: ignore[method-assign]
-
-    def of(self, names: tuple[str, ...], call: Callable[[], Any]) -> float:
-        """CPU seconds of kernels in a call."""
-        self.seconds.clear()
-        call()
-        return sum(self.seconds[name] for name in names)
-
-
-@dataclass(frozen=True)
-class Kernel:
-    """One kernel, the call that runs it, and its work.
-
-    names  of the kernels of the file;  units  of work of the call, in `unit`
-    operations, bytes  per unit, from the macros that the plan chose;  limit  what holds it back, from reading the loop
-    """
-
-    file: str
-    names: tuple[str, ...]
-    call: Callable[[], Any]
-    units: float
-    unit: str
-    operations: Callable[[Macros], float]
-    bytes: Callable[[Macros], float]
-    limit: str
+    def of(self, call: Call, device: Device) -> list[dict[str, Any]]:
+        """Rows of a call, and of the whole of it, whose kernel is ""."""
+        self.rows = {}
+        with (
+            mock.patch.object(Device, "run", lambda *args, **options: self.run(*args, **options)),
+            mock.patch.object(Device, "kernel", lambda *args, **macros: self.kernel(*args, **macros)),
+        ):
+            start = time.process_time()
+            call(device)
+            self.rows["", ""] = {"cpu_seconds": time.process_time() - start}
+        return [{"file": file, "kernel": name, **row} for (file, name), row in self.rows.items()]
 
 
-def noise(n: int) -> sarcl.PhaseHistory:
-    """n pulses of n samples over 300 m at 9.9 km, X band, 300 MHz."""
-    random = np.random.default_rng(0)
+def calls() -> dict[str, Call]:
+    """Calls by name, ceilings first."""
+    out: dict[str, Call] = {"ceilings": ceilings.launch_all}
+    for verb, n in SIZES.items():
+        for method in TASKS[verb].methods:
+            out[", ".join(filter(None, (verb, method)))] = functools.partial(bench_task, verb, n, method, TOLERANCE)
+    for verb, (n, tolerance) in FINE.items():
+        out[f"{verb}, tolerance {tolerance:.0e}"] = functools.partial(
+            bench_task, verb, n, TASKS[verb].methods[0], tolerance
+        )
+    return out | {
+        "backproject, list of points": listed,
+        "linear.Echoes, exact": linear,
+        "spectral echo of facets": spectral_facets,
+        "full wave, dielectric": dielectric,
+        "time steps of a large grid": time_steps,
+    }
+
+
+@functools.cache
+def case(verb: str, n: int) -> Any:
+    """The case of a verb's task, made once."""
+    return TASKS[verb].make(verb, n)
+
+
+def bench_task(verb: str, n: int, method: str, tolerance: float, device: Device) -> None:
+    """The call of a verb's task in `sarcl bench`."""
+    options = {"method": method} if method else {}
+    case(verb, n).call(tolerance=tolerance, device=device, check=False, **options)
+
+
+def noise() -> sarcl.PhaseHistory:
+    """512 pulses of noise, 300 MHz at 9.6 GHz, from 9.9 km."""
+    n = 512
     tx = np.stack([np.full(n, -7e3), np.linspace(-150, 150, n), np.full(n, 7e3)], axis=1)
-    samples = random.standard_normal((n, n, 2)).astype(np.float32).view(np.complex64)[..., 0]
+    samples = np.random.default_rng(0).standard_normal((n, 2 * n), np.float32).view(np.complex64)
     return sarcl.PhaseHistory(
         samples, frequency=9.45e9, frequency_step=3e8 / n, tx=tx, reference_range=np.linalg.norm(tx, axis=1)
     )
 
 
-def kernels(device: Device) -> list[Kernel]:
-    """Kernels with calls of about a tenth of a CPU second each, or more."""
-    n, random = 512, np.random.default_rng(1)
-    raw, plane = noise(n), sarcl.ImageGrid.plane(shape=(n, n), spacing=0.25)
-    listed = sarcl.ImageGrid.points(random.uniform(-30, 30, (n * n // 2, 3)) * [1, 1, 0.1])
-    points = sarcl.Scene.points(random.uniform(-60, 60, (n * n, 3)) * [1, 1, 0.01])
+def scattered(count: int) -> np.ndarray:
+    """Positions, m (count, 3), in no order."""
+    return np.random.default_rng(1).uniform(-30, 30, (count, 3)) * [1, 1, 0.1]
+
+
+def listed(device: Device) -> None:
+    """An image at points in no order."""
+    grid = sarcl.ImageGrid.points(scattered(2**17))
+    sarcl.backproject(noise(), grid, method="direct", tolerance=TOLERANCE, check=False, device=device)
+
+
+def linear(device: Device) -> None:
+    """Echoes and gradients of points by an operator in float64."""
+    positions, raw = scattered(2**13), noise()
+    operator = sarcl.linear.Echoes(positions, raw, tolerance=TOLERANCE, exact=True, device=device)
+    operator.gradients(np.ones(len(positions), complex), operator @ np.ones(len(positions), complex))
+
+
+def spectral_facets(device: Device) -> None:
+    """Spectral echoes of a hilly field of 2 x 64 x 64 facets beside a straight track of 512 pulses."""
+    line = sarcl.Trajectory.line(start=(0, -100, 6e3), velocity=(0, 100, 0), prf=250, n_pulses=512)
+    track = sarcl.pointing.stripmap(line, look=np.radians(50), side="right")
+    x = np.linspace(-20, 20, 65)
+    rough = sarcl.Material(eps_r=4.0, height=np.inf, diagram="cos")
+    hills = sarcl.Scene.from_heights(
+        x + 6e3 * np.tan(np.radians(50)), x, np.outer(np.sin(x), np.cos(x)), material=rough
+    )
     chirp = sarcl.Waveform.chirp(center=9.6e9, bandwidth=3e8, duration=1e-6)
-    track = sarcl.Trajectory(None, raw.tx)
-    cells, steps = 160, 16
-    grid = Lattice(0.01, (cells, cells, -(-cells // LANES) * LANES), np.zeros(3))
-    fields = Fields(device, grid, Target.nothing(), absorber=0, tile=10_000)
-    options = {"tolerance": 1e-2, "check": False, "device": device}
-
-    def image(domain: sarcl.ImageGrid) -> sarcl.Image:
-        return sarcl.backproject(raw, domain, method="direct", **options)
-
-    return [
-        Kernel(
-            "backproject_lines.cl",
-            ("backproject_lines",),
-            lambda: image(plane),
-            float(n) ** 3,
-            "pulse x pixel",
-            of_line,
-            lambda m: 32 / m["GROUP"],
-            "multiply-adds, and loads of samples from the first cache",
-        ),
-        Kernel(
-            "backproject.cl",
-            ("backproject",),
-            lambda: image(listed),
-            n * listed.size,
-            "pulse x pixel",
-            gathered,
-            lambda m: 32 / m["CHUNK"] + 12 / n,
-            "the gather of samples and its shuffles",
-        ),
-        Kernel(
-            "spread_points.cl",
-            ("spread",),
-            lambda: sarcl.echo(points, chirp, track, method="direct", **options),
-            float(n) ** 3,
-            "pulse x point",
-            spread_point,
-            lambda m: 20 / m.get("PULSES", 1),
-            "adding lane by lane to sums in the first cache",
-        ),
-        Kernel(
-            "nufft2d.cl",
-            ("spread",),
-            lambda: sarcl.polar_format(raw, plane, **options),
-            float(n) ** 2,
-            "sample",
-            spread_sample,
-            lambda m: 8.0,
-            "one lane per work-item: at most one in eight of the operations",
-        ),
-        Kernel(
-            "fdtd_vacuum.cl",
-            ("update_e", "update_h"),
-            lambda: fields.advance(steps),
-            float(steps * np.prod(grid.shape)),
-            "cell x step",
-            updated_cell,
-            lambda m: 72.0,
-            "memory: fields are larger than caches",
-        ),
-    ]
+    antenna = sarcl.Antenna.gaussian(width=(0.012, 0.5))
+    sarcl.spectral_echo(hills, chirp, track, antenna=antenna, tolerance=TOLERANCE, check=False, device=device)
 
 
-def ceilings(device: Device) -> Callable[[], dict[str, float]]:
-    """A function that measures operations and bytes per CPU second."""
-    lanes = device.info.vector_width
-    text = CEILINGS % {"lanes": lanes, "chains": CHAINS}
-    made = programs.kernels_of(programs.build(device.context, text, []))
-    out = device.zeros(4 * ITEMS * lanes)
-    arrays = [device.zeros(4 * TRIAD) for _ in range(3)]
-    each = TRIAD // lanes // ITEMS
+def dielectric(device: Device) -> None:
+    """Full-wave echoes of a dielectric sphere of 0.4 wavelengths: 8 pulses of 1 GHz, over 0.2 rad."""
+    sphere = sarcl.shapes.sphere(0.06, facets=320, material=sarcl.Material(eps_r=2.5))
+    chirp = sarcl.Waveform.chirp(center=1e9, bandwidth=1e8, duration=1e-7)
+    angles = np.linspace(-0.1, 0.1, 8)
+    track = sarcl.Trajectory(None, 100 * np.stack([np.cos(angles), np.sin(angles), 0.5 + 0 * angles], axis=1))
+    sarcl.fullwave_echo(sphere, chirp, track, cells=13, tolerance=TOLERANCE, model_error=False, device=device)
 
-    def seconds(kernel: Any, *args: Any) -> float:
-        device.finish()
-        start = time.process_time()
-        device.run(kernel, (ITEMS,), (1,), *args)
-        device.finish()
-        return time.process_time() - start
 
-    def measure() -> dict[str, float]:
-        register = seconds(made["multiply_add"], out, STEPS, np.float32(0.999))
-        memory = seconds(made["triad"], *arrays, np.float32(0.5), each)
-        operations = 2.0 * ITEMS * STEPS * CHAINS * lanes
-        return {"operations": operations / register, "bytes": 4 * 4.0 * TRIAD / memory}
+def time_steps(device: Device) -> None:
+    """Time steps of an empty full-wave grid."""
+    grid = Lattice(0.01, (CELLS, CELLS, -(-CELLS // LANES) * LANES), np.zeros(3))
+    Fields(device, grid, Target.nothing(), absorber=0, tile=10_000).advance(TIME_STEPS)
 
-    measure()
-    return measure
+
+def child(part: str, only: str, file: Path, libraries: list[Path]) -> None:
+    """One run of the calls in this process, counted where there are libraries; written to a file."""
+    device = open_device("cpu")
+    launches = Launches(operation_counts.Counters(libraries) if part == "count" else None)
+    warnings.simplefilter("ignore", sarcl.SarclWarning)
+    rows = []
+    for name, call in chosen(only).items():
+        rows += [{"call": name, **row} for row in launches.of(call, device)]
+    file.write_text(json.dumps(rows))
+
+
+def chosen(only: str) -> dict[str, Call]:
+    """Calls whose names contain a text, and the ceilings."""
+    return {name: call for name, call in calls().items() if only in name or name == "ceilings"}
+
+
+def counted(only: str, device: Device) -> list[dict[str, Any]]:
+    """What every kernel of the calls does."""
+    clang = operation_counts.clang_of(device.context.devices[0].platform.version)
+    processor = re.sub(r"^(?:pthread|basic|cpu)-(?:minimal-)?", "", device.info.name).rpartition("-")[0]
+    with tempfile.TemporaryDirectory() as folder:
+        cache, libraries = Path(folder), Path(folder, "libraries.json")
+        environment = {**os.environ, "POCL_CACHE_DIR": folder, **operation_counts.LEAVE_CODE}
+        command = [sys.executable, __file__, "--only", only, "--libraries", str(libraries), "--json"]
+        subprocess.run([*command, str(cache / "built.json"), "--part", "build"], env=environment, check=True)
+        paths = operation_counts.instrument(cache, clang, processor)
+        libraries.write_text(json.dumps([str(path) for path in paths]))
+        subprocess.run([*command, str(cache / "counted.json"), "--part", "count"], env=environment, check=True)
+        return list(json.loads((cache / "counted.json").read_text()))
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--only", default="", help="calls whose names contain this")
     parser.add_argument("--json", type=Path, default=RESULT)
+    parser.add_argument("--part", choices=("build", "count"), help=argparse.SUPPRESS)
+    parser.add_argument("--libraries", type=Path, help=argparse.SUPPRESS)
     asked = parser.parse_args()
+    if asked.part:
+        libraries = [Path(path) for path in json.loads(asked.libraries.read_text())] if asked.part == "count" else []
+        child(asked.part, asked.only, asked.json, libraries)
+        return
     device = open_device("cpu")
-    ceiling, timed = ceilings(device), Timed(device)
-    rows, best = kernels(device), {"operations": 0.0, "bytes": 0.0}
-    fastest = [float("inf")] * len(rows)
-    macros: list[dict[str, int]] = [{}] * len(rows)
-    for _ in range(asked.rounds + 1):
-        best = {name: max(best[name], value) for name, value in ceiling().items()}
-        for k, row in enumerate(rows):
-            fastest[k] = min(fastest[k], timed.of(row.names, row.call))
-            macros[k] = timed.macros.get(row.file, macros[k])
-    document = {**header([device]), "kind": "roofline", "command": "python bench/roofline.py", "ceilings": best}
-    document["kernels"] = [
-        {
-            "file": row.file,
-            "unit": row.unit,
-            "units": row.units,
-            "cpu_seconds": fastest[k],
-            "limit": row.limit,
-            "operations": row.operations(macros[k]),
-            "bytes": row.bytes(macros[k]),
-            "macros": macros[k],
-        }
-        for k, row in enumerate(rows)
-    ]
-    asked.json.write_text(json.dumps(document, indent=1, default=int) + "\n")
-    for row in document["kernels"]:
-        rate = row["units"] / row["cpu_seconds"]
-        print(
-            f"{row['file']}: {rate / 1e6:.1f} M {row['unit']} per CPU s, {row['operations']:.0f} operations, "
-            f"{rate * row['operations'] / best['operations']:.0%} of the operations, "
-            f"{rate * row['bytes'] / best['bytes']:.0%} of the bytes; {row['macros']}"
-        )
-    print(best)
+    warnings.simplefilter("ignore", sarcl.SarclWarning)
+    rows = counted(asked.only, device)
+    ceilings.verified(rows, device.info.vector_width)
+    launches = Launches()
+    once = {(row["call"], row["file"], row["kernel"]): row.get("launches") for row in rows}
+    fastest: dict[tuple[str, str, str], float] = {}
+    for _ in range(asked.rounds + 1):  # the first round builds kernels
+        for name, call in chosen(asked.only).items():
+            for row in launches.of(call, device):
+                key = name, row["file"], row["kernel"]
+                if row.get("launches") != once.get(key):
+                    raise RuntimeError(
+                        f"{key} is launched {row.get('launches')} times, but {once.get(key)} when counted"
+                    )
+                fastest[key] = min(fastest.get(key, np.inf), row["cpu_seconds"])
+    for row in rows:
+        row["cpu_seconds"] = fastest[row["call"], row["file"], row["kernel"]]
+    document = {
+        **header([device]),
+        "kind": "roofline",
+        "command": "python bench/roofline.py",
+        "ceilings": ceilings.rates(rows),
+    }
+    document["kernels"] = rows
+    document["unused"] = sorted({path.name for path in KERNELS.glob("*.cl")} - {row["file"] for row in rows})
+    asked.json.write_text(json.dumps(document, indent=1) + "\n")
+    print(document["ceilings"])
 
 
 if __name__ == "__main__":

@@ -8,7 +8,6 @@ from pathlib import Path
 import contract_trial
 import proof_page
 import pytest
-import roofline
 from helpers import tasks
 
 ROOT = Path(__file__).parents[2]
@@ -59,11 +58,3 @@ def test_a_trial_continues_where_its_file_ends_and_counts_what_is_wrong(monkeypa
     contract_trial.try_again(entry, "verb")
     assert [f["seed"] for f in entry["failures"]] == [5] and [f["seed"] for f in entry["mended"]] == [1, 6]
     assert sorted(entry["ratios"]) == [0.5] * 7 and proof_page.held(entry) == 7
-
-
-def test_operations_are_those_of_the_formulas():
-    macros = {"ORDER": 2, "TAPS": 2, "TERMS": 1, "LINE_TAPS": 4, "SLOPE": 0}
-    assert roofline.weights(macros) == 2 and roofline.weights({"TAPS": 4, "TERMS": 5}) == 41
-    assert roofline.of_line(macros) == 32 and roofline.of_line(macros | {"SLOPE": 1}) == 64
-    assert roofline.gathered(macros) == 21 + 2 + 8 + 23 + 8
-    assert roofline.updated_cell({}) == 30
