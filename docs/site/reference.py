@@ -30,6 +30,26 @@ INTERNAL = {
     "stop_and_go": {"StopAndGo", "pulse_motion"},
     "wgs84": {"vertical_at", "is_earth_fixed"},
 }
+# Methods and properties that serve other rooms of the package: class -> names without a place here.
+INTERNAL_MEMBERS = {
+    "Antenna": {"error", "has_root", "limits", "packed", "ratio", "slope"},
+    "ElevationModel": {"cells_at", "grid_positions", "heights_in"},
+    "Illumination": {"among", "between", "level", "levels_around", "of_nothing", "share", "spans"},
+    "ImageGrid": {"filled", "positions_of", "sample"},
+    "Echoes": {"result_type"},
+    "Scenario": {
+        "default_grid_options",
+        "describe_image",
+        "describe_orbit",
+        "focuses_in_blocks",
+        "has_image",
+        "needs_grid",
+    },
+    "Scene": {"at_frequency", "has_random_points", "kept", "on_heights", "part", "scattering_models"},
+    "ToleranceUnreachable": {"placed", "restated"},
+    "Trajectory": {"known_times", "picked"},
+    "Bar": {"wipe"},
+}
 # Names of public modules that are defined elsewhere: module -> names
 TAKEN_OVER = {
     "material": ("MATERIALS",),
@@ -82,6 +102,8 @@ def members(kind: type) -> Iterator[tuple[str, str, Any]]:
     for home in kind.__mro__:
         for name, value in vars(home).items() if home.__module__.startswith("sarcl.") else ():
             if name.startswith("_") or name in seen or not inspect.getdoc(value):
+                continue
+            if name in INTERNAL_MEMBERS.get(kind.__name__, ()):
                 continue
             seen.add(name)
             if isinstance(value, (classmethod, staticmethod)):
@@ -144,8 +166,35 @@ def _member(owner: Name, kind: str, name: str, value: Any) -> str:
         result = getattr(getattr(value, "fget", None) or value.func, "__annotations__", {}).get("return", "")
         return _directive("property", path, "", _text(doc, {}, owner.path), [f":type: {_plain(result)}"] * bool(result))
     flags = [f":{kind}:"] if kind != "method" else []
-    bound = kind != "staticmethod"
-    return _directive("method", path, _signature(value, doc, bound), _text(doc, _types(value), owner.path), flags)
+    text = _text(doc, _types(value), owner.path) + (_note() if examples(doc) else "")
+    return _directive("method", path, _signature(value, doc, kind != "staticmethod"), text, flags)
+
+
+def undocumented(name: Name) -> list[str]:
+    """What the page of a public name leaves out: methods without an example, parameters that no docstring names.
+
+    An example of a method is its own, or one of its class that calls it. A parameter is named by its own docstring,
+    or by that of the class for a classmethod, of the module for a function.
+    """
+    if not inspect.isclass(name.value):
+        return _unnamed(name.path, name.value, inspect.getdoc(inspect.getmodule(name.value)) or "")
+    calls, lacks = "\n".join(examples(name.doc)), []
+    for kind, member, value in members(name.value) if not issubclass(name.value, tuple) else ():
+        if kind == "property":
+            continue
+        path = f"{name.path}.{member}"
+        if not examples(inspect.getdoc(value) or "") and f".{member}(" not in calls:
+            lacks.append(f"{path}: no example")
+        lacks += _unnamed(path, value, name.doc if kind == "classmethod" else "", skip=kind != "staticmethod")
+    return lacks
+
+
+def _unnamed(path: str, value: Any, context: str, skip: bool = False) -> list[str]:
+    """Parameters of a function that neither its docstring nor `context` names."""
+    text = re.sub(r"^ *(>>>|\.\.\.) .*$", "", f"{inspect.getdoc(value)}\n{context}", flags=re.M)  # without examples
+    parameters = list(inspect.signature(value).parameters.values())[skip:]
+    named = [p.name for p in parameters if p.kind not in (p.VAR_POSITIONAL, p.VAR_KEYWORD) and p.name[0] != "_"]
+    return [f"{path}: {name} is not named" for name in named if not re.search(rf"(?<![\w.]){name}\b", text)]
 
 
 def _directive(

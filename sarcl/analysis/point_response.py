@@ -74,6 +74,7 @@ class PointResponse:
     [0.63, 0.39]
     >>> round(point.rcs, 2)  # m^2
     1.0
+    >>> picture = point.show()  # a PIL.Image.Image of both cuts
     """
 
     position: NDArray[np.float64]

@@ -21,6 +21,8 @@ class Ambiguity:
     >>> chi = sarcl.ambiguity(np.ones(64), rate=64e6)
     >>> chi.magnitude.shape, round(float(chi.volume), 3)
     ((127, 128), 1.0)
+    >>> float(chi.delay_of_peak()[64])  # s, without Doppler shift
+    0.0
     """
 
     delays: NDArray[np.float64]

@@ -65,7 +65,7 @@ def geometric(x: ArrayLike, n: int) -> np.ndarray:
 def constant_factor(
     f0: float, *, shape: Sequence[int] | np.ndarray, spacing: ArrayLike, cosines: Cosines
 ) -> np.ndarray:
-    """Array factor of N by P elements on one carrier, (3.23). cosines (ky, kz), each (...).
+    """Array factor of shape (N, P) elements on one carrier, (3.23). cosines (ky, kz), each (...).
 
     >>> factor = sarcl.array_factor.constant_factor(10e9, shape=(8, 1), spacing=(0.015, 0), cosines=(0.0, 0.0))
     >>> float(abs(factor))
@@ -154,6 +154,8 @@ def quadratic_phase(
 ) -> float:
     """Largest phase that the closed form neglects, rad: the sum of moduli of the terms of (3.39).
 
+    shape (N, P), spacing (dy, dz) m, frequency_step (dfy, dfz) Hz, cosines (ky, kz)
+
     Farooq accepts up to pi/4. Cosines of 1 give (3.40); (1, 0) is the plane of azimuth alone, (3.59). Moduli are summed
     because steps of opposite signs cancel at the corner (N, P), which the paper considers, but not elsewhere.
 
@@ -175,6 +177,8 @@ def beam_angles(
     f0: float, *, spacing: ArrayLike, frequency_step: ArrayLike, retarded: ArrayLike, lobe: tuple[int, int] = (0, 0)
 ) -> tuple[np.ndarray, np.ndarray]:
     """(azimuth, elevation) rad of the beam at retarded time t', (3.53) and (3.54) for elements at +n d; NaN where none.
+
+    spacing, frequency_step  (d, df) from element to element along y, z, m, Hz
 
     sin(elevation) = (c/(f0 dz)) (v - dfz t');  sin(azimuth) cos(elevation) = (c/(f0 dy)) (u - dfy t');  lobe (u, v).
     Along y alone: sin(azimuth) = -(c/(f0 d)) df t'. Farooq's layout, -n d, has the opposite signs.
@@ -204,7 +208,7 @@ def beam_angles(
 
 
 def period(frequency_step: float) -> float:
-    """1/|df|, s: a pulse of this length holds one peak, (4.15).
+    """1/|df|, s, df the frequency_step: a pulse of this length holds one peak, (4.15).
 
     >>> 1e9 * sarcl.array_factor.period(20e6)  # ns
     50.0
@@ -213,7 +217,7 @@ def period(frequency_step: float) -> float:
 
 
 def main_lobe(n: int, frequency_step: float) -> float:
-    """2/(n |df|), s between the nulls beside the peak, (4.14).
+    """2/(n |df|), s between the nulls beside the peak, df the frequency_step, (4.14).
 
     >>> 1e9 * sarcl.array_factor.main_lobe(50, 20e6)  # ns
     2.0
@@ -222,7 +226,7 @@ def main_lobe(n: int, frequency_step: float) -> float:
 
 
 def bandwidth(n: int, frequency_step: float) -> float:
-    """n |df|, Hz, of n pulses of length 1/|df|, (4.18).
+    """n |df|, Hz, of n pulses of length 1/|df|, df the frequency_step, (4.18).
 
     >>> sarcl.array_factor.bandwidth(45, 20e6)
     900000000.0
@@ -231,7 +235,7 @@ def bandwidth(n: int, frequency_step: float) -> float:
 
 
 def time_bandwidth(n: int, frequency_step: float) -> float:
-    """bandwidth times period: n, (4.19).
+    """bandwidth times period: n, for every frequency_step, (4.19).
 
     >>> sarcl.array_factor.time_bandwidth(45, 20e6)
     45.0
@@ -240,7 +244,7 @@ def time_bandwidth(n: int, frequency_step: float) -> float:
 
 
 def center_frequency(f0: float, n: int, frequency_step: float) -> float:
-    """f0 + (n - 1) df/2, Hz, (4.6).
+    """f0 + (n - 1) df/2, Hz, df the frequency_step, (4.6).
 
     >>> sarcl.array_factor.center_frequency(10e9, 45, 20e6)
     10440000000.0
@@ -253,7 +257,7 @@ def center_frequency(f0: float, n: int, frequency_step: float) -> float:
 def peak_delay(
     f0: float, *, spacing: float, frequency_step: float, azimuth: ArrayLike, elevation: ArrayLike = 0.0, n: int = 1
 ) -> np.ndarray:
-    """Delay of the peak, s after R/c: -d cos(elevation) sin(azimuth) f/(c df) for elements at +n d.
+    """Delay of the peak, s after R/c: -d cos(elevation) sin(azimuth) f/(c df) for elements at +n d, df frequency_step.
 
     n = 1: f = f0, the peak of the closed form, (4.27), which has the other sign for its elements at -n d.
     n elements: f = f0 + (n - 1) df, the peak of the exact field: the part i (n - 1) of its phase i^2 dk d k is linear.
@@ -279,6 +283,8 @@ def waveform(
     pulsed: bool = False,
 ) -> np.ndarray:
     """exp(j 2 pi f0 t') times the factor of n elements in a row, (4.9); pulsed: 0 where |t'| > period/2, (4.16).
+
+    retarded  t', s (...);  spacing, frequency_step  from element to element, m, Hz
 
     >>> times = [0.0, 3e-9]  # s
     >>> pulse = sarcl.array_factor.waveform(10e9, 8, spacing=0.015, frequency_step=20e6, azimuth=0.0, retarded=times)

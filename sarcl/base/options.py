@@ -29,7 +29,7 @@ class Option:
 
 def option(default: object, doc: str = "", check: Check | None = None, *, in_files: bool = True) -> Any:
     """The field of an option. Where the record inherits the option, `doc` and `check` may be left out: those of the
-    nearest base count.
+    nearest base count. in_files: whether scenario files may set it.
 
     >>> sarcl.option(4, "number of parts of the track").default
     4

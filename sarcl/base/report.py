@@ -62,6 +62,8 @@ class Report(NotebookTable):
 
     >>> image.report.predicted_error <= image.report.tolerance, image.report.contributions_done
     (True, 1048576)
+    >>> image.report.to_dict()["tolerance"] == image.report.tolerance
+    True
     """
 
     plan: Mapping[str, object] = field(default_factory=dict)

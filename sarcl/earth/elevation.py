@@ -39,6 +39,7 @@ class ElevationModel:
     >>> model = sarcl.ElevationModel([7.0, 7.1, 7.2], [46.0, 46.1], [[500, 600, 700], [600, 700, 800]])
     >>> round(float(model.heights_at(7.05, 46.05)), 3)
     600.0
+    >>> alps = sarcl.ElevationModel.read("terrain.tif", heights="ellipsoid")  # needs sarcl[maps]
     """
 
     longitude: Floats
@@ -81,7 +82,8 @@ class ElevationModel:
         nodata: float | None = None,
         external: bool = False,
     ) -> ElevationModel:
-        """The elevation model of a file that rasterio reads; arguments and errors as in `Scene.from_dem`."""
+        """The elevation model of a file that rasterio reads: path, bounds, heights, geoid, nodata, external, and
+        errors, as in `Scene.from_dem`."""
         tile = elevation.load(path, bounds=bounds, heights=heights, geoid=geoid, nodata=nodata, external=external)
         try:
             return cls(tile.longitude, tile.latitude, tile.height)
@@ -106,7 +108,8 @@ class ElevationModel:
         return float(min(np.linalg.norm(np.diff(line, axis=0), axis=1).min() for line in lines))
 
     def heights_at(self, longitude: ArrayLike, latitude: ArrayLike) -> Floats:
-        """Heights above the ellipsoid, m (...), at degrees (...); NaN outside the grid and in cells without data."""
+        """Heights above the ellipsoid, m (...), at longitude, latitude, degrees (...); NaN outside the grid and in
+        cells without data."""
         lon, lat = validation.values("longitude", longitude), validation.values("latitude", latitude)
         try:
             lon, lat = np.broadcast_arrays(lon, lat)

@@ -73,6 +73,8 @@ def sinusoidal(
 ) -> Trajectory:
     """The track moved by amplitude sin(2 pi frequency t + phase): m (3,), Hz, rad, one or per axis.
 
+    frame  "scene": the amplitude is along its axes; "track": along those of the track
+
     A motion of amplitude a along the line of sight causes paired echoes of amplitude J_1(4 pi a/lambda) beside a point.
 
     >>> flown = sarcl.motion.sinusoidal(track, amplitude=(0, 0, 0.02), frequency=2.0)

@@ -35,7 +35,7 @@ def add_noise(
     cell_area: float | None = None,
     seed: int = 0,
 ) -> PhaseHistory:
-    """Echoes with complex white Gaussian noise, at a level that is given in one of five ways.
+    """The echoes `raw` with complex white Gaussian noise, at a level that is given in one of five ways.
 
     nesz_db, nesz  noise-equivalent sigma zero, dB or m^2/m^2: the mean of |image.data/image.gain|^2 over the
                    resolution cell's area, focused from the rows of one polarisation. The cell is that at the centre of
@@ -120,7 +120,9 @@ def _kelvin(radar: Radar | None) -> float:
 
 
 def cell_area(raw: PhaseHistory, point: ArrayLike, normal: ArrayLike = (0.0, 0.0, 1.0)) -> float:
-    """Area, m^2, of the resolution cell at `point` on a plane: the integral of |response|^2 over its peak.
+    """Area, m^2, of the resolution cell at `point` on a plane with a `normal`, of the echoes `raw`.
+
+    It is the integral of |response|^2 over its peak.
 
     By Parseval it is (2 pi)^2 times the mean, over the samples, of 1/(the area of spatial frequencies that a sample
     occupies), over their number. For samples that are even there it is (2 pi)^2 over the area of all of them:

@@ -1,7 +1,7 @@
 """A page in one HTML file: headings, paragraphs, tables and figures, which the template page.html.j2 lays out.
 
 Needs the extra `plots`. The functions below make a page's blocks; text is escaped by the template. A page begins with
-a strip of its pictures and one table of its results; sections follow, and terms and explanations end it.
+a strip of its pictures, its terms and one table of its results; sections follow, and explanations end it.
 """
 
 from __future__ import annotations
@@ -58,9 +58,9 @@ def listed(texts: Sequence[str]) -> Block:
     return {"kind": "listed", "texts": texts}
 
 
-def terms(pairs: Sequence[tuple[str, str]]) -> Block:
-    """Terms with what they mean."""
-    return {"kind": "terms", "pairs": pairs}
+def terms(pairs: Sequence[tuple[str, str]], summary: str = "") -> Block:
+    """Terms with what they mean; with a summary folded under that line, which opens them."""
+    return {"kind": "terms", "pairs": pairs, "summary": summary}
 
 
 def table(
@@ -84,8 +84,8 @@ def table(
 def strip(blocks: Sequence[Block]) -> list[Block]:
     """A row of small pictures that lead to figures of `blocks`; none where there are no figures.
 
-    Every section, by its heading, has one before any has two, and grey pictures come before plots: one of each section,
-    but STRIP[0] to STRIP[1] in all.
+    Every section, by its heading, has one before any has two, chosen pictures first, then grey ones, then plots: one of
+    each section, but STRIP[0] to STRIP[1] in all.
     """
     sections: list[tuple[str, list[Block]]] = [("", [])]
     for block in blocks:
@@ -96,7 +96,7 @@ def strip(blocks: Sequence[Block]) -> list[Block]:
     ranks = [
         (rank, not figure["grey"], i, f"{head}: {_title(figure)}", figure)
         for i, (head, figures) in enumerate(sections)
-        for rank, figure in enumerate(sorted(figures, key=lambda figure: not figure["grey"]))
+        for rank, figure in enumerate(sorted(figures, key=lambda figure: (not figure["chosen"], not figure["grey"])))
     ]
     most = int(np.clip(sum(bool(figures) for _, figures in sections), *STRIP))
     chosen = sorted(sorted(ranks, key=lambda entry: entry[:3])[:most], key=lambda entry: entry[2])
@@ -151,11 +151,13 @@ def picture(
     caption: str,
     *,
     percentile: float = 100.0,
+    chosen: bool = False,
     **look: Unpack[plots.PictureLook],
 ) -> Block:
     """A figure of decibels in grey, or of values of another unit; see `plots.picture`.
 
     percentile  of the values at which the scale has white
+    chosen      of the figures of its section, this one stands for the section in `strip`
     """
     db = np.asarray(db, np.float64)
     top = float(np.percentile(db, percentile))
@@ -165,9 +167,10 @@ def picture(
     scale = f"White: {white}; black: {-floor_db:g} dB below."
     if not unit.startswith("dB"):
         scale = f"White: {top:.2g}; black: {top + floor_db:.2g} {unit}."
-    return _figure(data, f"{caption} {scale}", f"Levels over {x_name} and {y_name}", grey=True)
+    return _figure(data, f"{caption} {scale}", f"Levels over {x_name} and {y_name}", grey=True, chosen=chosen)
 
 
-def _figure(data: bytes, caption: str, alt: str, grey: bool = False) -> Block:
+def _figure(data: bytes, caption: str, alt: str, grey: bool = False, chosen: bool = False) -> Block:
     content = b64encode(data).decode("ascii")
-    return {"kind": "figure", "data": content, "caption": caption, "alt": alt, "grey": grey, "anchor": ""}
+    look = {"grey": grey, "chosen": chosen}
+    return {"kind": "figure", "data": content, "caption": caption, "alt": alt, "anchor": "", **look}

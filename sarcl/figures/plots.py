@@ -83,13 +83,14 @@ def style(i: int) -> dict[str, Any]:
     """Colour, line style and marker of curve i, as matplotlib's options.
 
     Lines get thinner and hollow markers smaller from curve to curve, so that curves that coincide can all be seen.
+    Where colours repeat, line style and marker are those of other colours.
     """
-    k = i % len(COLORS)
+    lap, k = divmod(i, len(COLORS))
     return {
         "color": COLORS[k],
-        "linestyle": LINES[k],
+        "linestyle": LINES[(k + lap) % len(LINES)],
         "linewidth": 2.6 - 0.3 * k,
-        "marker": MARKERS[k],
+        "marker": MARKERS[(k + 3 * lap) % len(MARKERS)],
         "markersize": 9.0 - k,
         "markerfacecolor": "none",
     }

@@ -89,6 +89,16 @@ class Echoes(NamedOperator):
     >>> pixels = operator.H @ raw.samples.ravel()
     >>> np.allclose(pixels.reshape(grid.shape), image.data, atol=1e-2 * image.gain)
     True
+    >>> x = np.ones(operator.shape[1], np.complex64)
+    >>> np.allclose(operator.normal(x), operator.H @ operator.dot(x), rtol=1e-2, atol=1e-2 * operator.norm())
+    True
+    >>> gradients = operator.gradients(x, raw.samples.ravel(), of="tx")
+    >>> moved = operator.at(tx=raw.tx + 0.01)
+    >>> y = operator.A(x.reshape(grid.shape))
+    >>> operator.A_adjoint(y).shape
+    (128, 128)
+    >>> f = operator.torch()  # needs sarcl[torch]
+    >>> g = operator.jax()  # needs sarcl[jax]
     """
 
     def __init__(
@@ -184,7 +194,7 @@ class Echoes(NamedOperator):
         return self._applied("x", pixels, values)
 
     def norm(self, tolerance: float = 1e-3, seed: int = 0) -> float:
-        """The largest singular value, by power iteration from random amplitudes; a lower bound.
+        """The largest singular value, by power iteration from random amplitudes (`seed`); a lower bound.
 
         Changes from round to round shrink by a ratio: iterations stop where the rest of that series is below
         `tolerance`, at most after 200.
@@ -251,7 +261,7 @@ class Echoes(NamedOperator):
         rx: ArrayLike | None = None,
         reference_range: ArrayLike | None = None,
     ) -> Echoes:
-        """The operator at other positions of points, m (n, 3), or antennas, m (n_rows, 3), or reference ranges, m.
+        """The operator at other positions of points, m (n, 3), antennas tx, rx, m (n_rows, 3), or reference_range, m.
 
         Other arguments are as they were, and the axes of antennas too. In float64 the plan is kept as long as it meets
         the tolerance, else, and in float32, it is planned for the new geometry.
@@ -313,14 +323,14 @@ class Echoes(NamedOperator):
         return array
 
     def A(self, x: ArrayLike) -> np.ndarray:
-        """Samples (..., n_rows, n_samples) of images (..., *shape of the domain): the forward operator of deepinv.
+        """Samples (..., n_rows, n_samples) of images x (..., *shape of the domain): the forward operator of deepinv.
 
         Tensors of PyTorch give tensors, which are differentiated.
         """
         return self._of_batch(self, x, self._measurement.task.grid.shape, self._measurement.shape)
 
     def A_adjoint(self, y: ArrayLike) -> np.ndarray:
-        """Images (..., *shape of the domain) of samples (..., n_rows, n_samples): the adjoint operator of deepinv.
+        """Images (..., *shape of the domain) of samples y (..., n_rows, n_samples): the adjoint operator of deepinv.
 
         Tensors of PyTorch give tensors, which are differentiated.
         """

@@ -123,7 +123,8 @@ class EchoRows(NotebookTable):
     def select(
         self, *, polarization: str | None = None, channel: int | None = None, sender: int | None = None
     ) -> PhaseHistory:
-        """Rows of one polarisation ("HV"), receive channel, transmitting element. ValueError lists those that exist."""
+        """Rows of one `polarization` ("HV"), receive `channel`, transmitting element `sender`. ValueError lists those
+        that exist."""
         is_selected, described = np.ones(self.n_rows, bool), "these data"
         for name, values, value in (
             ("polarization", self.polarization, polarization),
@@ -148,6 +149,8 @@ class EchoRows(NotebookTable):
 
         s~_p(t) = sum_n s_p(f_n) exp(+j 2 pi (f_n - fc) t), not normalised, fc the frequency of sample
         n_samples//2. One delay axis where every row has the same frequency step.
+
+        oversample  number of delays over that of samples
         """
         n = self.n_samples * validation.count("oversample", oversample)
         what = f"a signal of {n if n < 2**60 else 2.0**60:.3g} samples or more in {self.n_rows} rows"

@@ -45,6 +45,11 @@ class Antenna:
     >>> dish = sarcl.Antenna.gaussian(width=(0.02, 0.02), gain_db=38)
     >>> round(float(20 * np.log10(abs(dish.gain([1, 0.01, 0], frequency=9.6e9)))), 2)  # half its width off the axis, dB
     34.99
+    >>> slot, dot = sarcl.Antenna.rectangular(size=(1.5, 0.3), gain_db=30), sarcl.Antenna.isotropic(gain_db=3)
+    >>> angles = np.radians(np.linspace(-20, 20, 41))  # azimuth, elevation
+    >>> measured = sarcl.Antenna.table(angles, angles, values_db=-400 * (angles[:, None] ** 2 + angles**2), gain_db=20)
+    >>> measured.axes(sarcl.pointing.spotlight(track, (0, 0, 0))).shape  # antenna axes at every pulse
+    (64, 3, 3)
     """
 
     kind: Kind

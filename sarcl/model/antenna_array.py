@@ -32,6 +32,15 @@ class AntennaArray:
     >>> array = sarcl.AntennaArray.linear(8, spacing=0.015, frequency_step=20e6)
     >>> array.n, array.offsets_at(0)[:3] / 1e6
     (8, array([ 0., 20., 40.]))
+    >>> single, plane = sarcl.AntennaArray.single(), sarcl.AntennaArray.planar((2, 4), spacing=(0.015, 0.02))
+    >>> sarcl.AntennaArray.costas(6, spacing=0.015, frequency_step=1e6).offsets_at(0) / 1e6  # a permutation
+    array([0., 2., 1., 5., 3., 4.])
+    >>> array.subarrays(4).offsets_at(0) / 1e6  # pairs of elements send one carrier
+    array([  0.,   0.,  40.,  40.,  80.,  80., 120., 120.])
+    >>> array.mirrored(at=32, n_pulses=64).offsets_at(40)[:3] / 1e6  # the last carriers first
+    array([140., 120., 100.])
+    >>> array.switched(array.with_offsets(np.zeros(8)), at=32, n_pulses=64).offsets_at(40)[:3]  # one carrier
+    array([0., 0., 0.])
     """
 
     positions: NDArray[np.float64]
@@ -137,6 +146,8 @@ class AntennaArray:
     ) -> AntennaArray:
         """Like `linear`, but element i transmits f0 + g(i) frequency_step, g a Costas permutation of 0 ... n - 1.
 
+        spacing, axis, weights  as of `linear`
+
         Raises ValueError where the constructions of Welch and Golomb modulo a prime give none of this size.
         """
         order = permutation(_size("n", n))
@@ -149,7 +160,7 @@ class AntennaArray:
         return cls.linear(n, spacing=spacing, axis=axis, weights=weights).with_offsets(offsets)
 
     def with_offsets(self, offsets: ArrayLike, *, plan: ArrayLike | None = None) -> AntennaArray:
-        """The same elements with other carriers: Hz (n,), or (n_plans, n) with the `plan` of the pulses."""
+        """The same elements with other `offsets`, Hz (n,), or (n_plans, n) with the `plan` of the pulses."""
         rows = validation.converted("array offsets", offsets, np.float64)
         return replace(self, offsets=rows[None] if rows.ndim == 1 else rows, plan=cast(Any, plan))
 
@@ -193,8 +204,9 @@ class AntennaArray:
         return self.with_offsets(np.concatenate([self.offsets, other.offsets]), plan=plan)
 
     def mirrored(self, at: int, n_pulses: int) -> AntennaArray:
-        """From pulse `at` on the carriers run over the elements in reverse order: progressions change sign, the base
-        frequency moves with them, and the centre frequency stays (Farooq 2009, equations 5.33 to 5.35)."""
+        """Of n_pulses, from pulse `at` on the carriers run over the elements in reverse order: progressions change
+        sign, the base frequency moves with them, and the centre frequency stays (Farooq 2009, equations 5.33 to 5.35).
+        """
         return self.switched(replace(self, offsets=self.offsets[:, ::-1]), at, n_pulses)
 
     def _rows(self, n_pulses: int) -> np.ndarray:

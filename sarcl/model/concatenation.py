@@ -17,7 +17,7 @@ _Common: TypeAlias = Waveform | AntennaArray | np.ndarray | str | None  # fields
 
 
 def concatenate(parts: Sequence[PhaseHistory]) -> PhaseHistory:
-    """One phase history with the rows of several, in order; all need the same number of samples.
+    """One phase history with the rows of several `parts`, in order; all need the same number of samples.
 
     Optional fields per row, the waveform, image area and metadata are kept where every part has them; lazy samples stay
     lazy.

@@ -58,6 +58,12 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
     >>> image.shape, round(float(abs(image[64, 64]) / image.gain), 2)
     ((128, 128), 1.0)
     >>> image.save("points.png", floor_db=-40)
+    >>> round(float(image.decibels().max()), 2), round(float(abs(image.normalized()).max()), 2)  # a unit point
+    (0.0, 1.0)
+    >>> image.multilook((4, 2)).shape
+    (32, 64)
+    >>> picture = image.show(floor_db=-30)  # a PIL.Image.Image, which notebooks draw
+    >>> dataset = image.to_xarray()  # needs sarcl[xarray]
     """
 
     data: Any
@@ -295,7 +301,7 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
         return image_dataset(self)
 
     def layers(self, elevation: ElevationModel) -> dict[str, NDArray[np.bool_] | NDArray[np.float64]]:
-        """ "layover", "shadow" (bool) and "incidence" (rad) of terrain at the pixels, each of grid.shape.
+        """ "layover", "shadow" (bool), "incidence" (rad) of terrain, `elevation`, at the pixels, each of grid.shape.
 
         They are those of the terrain above or below each pixel, for the antennas that the image keeps: tx and rx at
         mid-aperture, those of `aperture` that saw the pixel, or, of `range_doppler`, where they pass it. layover: other
@@ -303,6 +309,16 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
         incidence: from the terrain's normal to the direction of the antenna, or between those of both antennas. Terrain
         beyond the model hides nothing; pixels outside it are False, and NaN in incidence. Equations and steps:
         sarcl/earth/layers.py. ValueError for an image in a local frame or without tx.
+
+        >>> orbit = sarcl.Orbit.kepler(semi_major_axis=7.07e6, eccentricity=0, inclination=1.71)
+        >>> lon, lat, _ = sarcl.wgs84.geodetic(orbit.boresight(10.0, look=0.5))  # degrees
+        >>> target = sarcl.Scene.points([[0, 0, 0]]).on_earth(lon, lat)
+        >>> seen = sarcl.echo(target, chirp, orbit.trajectory(center=10.0, prf=1500, n_pulses=16))
+        >>> pixels = sarcl.backproject(seen, sarcl.ImageGrid.plane(shape=(8, 8), spacing=2.0).on_earth(lon, lat))
+        >>> flat = sarcl.ElevationModel(lon + np.array([-0.1, 0.1]), lat + np.array([-0.1, 0.1]), np.zeros((2, 2)))
+        >>> layers = pixels.layers(flat)
+        >>> bool(layers["shadow"].any()), round(float(np.degrees(layers["incidence"].mean())), 1)
+        (False, 32.1)
         """
         from .maps.saving import image_layers
 

@@ -40,6 +40,22 @@ class ImageGrid:
     >>> grid = sarcl.ImageGrid.plane(center=(0, 0, 2), shape=(3, 5), spacing=0.5)
     >>> grid.positions.shape, grid.positions[1, 2]
     ((3, 5, 3), array([0., 0., 2.]))
+    >>> grid.at(1.5, 2), grid.index((0.1, 0, 2))  # a position, and fractional (row, column)
+    (array([0.  , 0.25, 2.  ]), array([1. , 2.2]))
+    >>> grid.normal_at(1, 2), grid.spacing_at(1, 2)
+    (array([0., 0., 1.]), (0.5, 0.5))
+    >>> grid.columns(1, 3).shape, grid.part(slice(0, 3, 2), slice(4)).shape
+    ((3, 2), (2, 4))
+    >>> sarcl.ImageGrid.points([[0, 0, 1], [5, 0, 1]]).shape  # any positions
+    (2,)
+    >>> alps = sarcl.ElevationModel([7.0, 7.01, 7.02], [46.0, 46.01], [[500, 600, 700], [600, 700, 800]])
+    >>> terrain = sarcl.ImageGrid.on_terrain(alps, spacing=50)
+    >>> place = grid.on_earth(longitude=7.01, latitude=46.005, height=640)
+    >>> utm = (350e3, 5.1e6, 351e3, 5.101e6)  # west, south, east, north, m
+    >>> on_map = sarcl.ImageGrid.on_map("EPSG:32632", bounds=utm, spacing=10)  # needs sarcl[maps]
+    >>> orbit = sarcl.Orbit.kepler(semi_major_axis=7.07e6, eccentricity=0, inclination=1.71)
+    >>> times, ranges = np.linspace(0, 0.1, 3), 900e3 + 10 * np.arange(4)  # s, m
+    >>> swath = sarcl.ImageGrid.zero_doppler(times, ranges, orbit.geolocate(times[:, None], ranges, heights=0.0))
     """
 
     shape: tuple[int, ...]
@@ -233,13 +249,18 @@ class ImageGrid:
         """The grid that an installed package adds under a name (docs/developers/extensions.md), with its options.
 
         ValueError for a name that no package adds; ImportError for a package that cannot be loaded; and as `points`.
+
+        >>> fan = sarcl.ImageGrid.extension("fan", near=1, far=9)  # needs a package that adds "fan"
         """
         from ..io.added_grids import positions_of
 
         return cls.points(positions_of(name, options))
 
     def on_earth(self, longitude: float, latitude: float, height: float = 0.0) -> ImageGrid:
-        """This grid, in x east, y north, z up of a place, in Earth-fixed coordinates: see `Scene.on_earth`."""
+        """This grid, in x east, y north, z up of a place, in Earth-fixed coordinates: see `Scene.on_earth`.
+
+        longitude, latitude  of the place, degrees;  height  above the ellipsoid, m
+        """
         from ..earth.place import Place
 
         place = Place(longitude, latitude, height)
@@ -282,7 +303,7 @@ class ImageGrid:
         return part
 
     def part(self, *slices: slice) -> ImageGrid:
-        """The grid of some of the pixels: a slice for each of the first axes, with positive steps.
+        """The grid of some of the pixels: `slices`, one for each of the first axes, with positive steps.
 
         IndexError where a step is not positive or nothing is left.
         """
@@ -359,7 +380,7 @@ class ImageGrid:
         return self.listed[index]
 
     def normal_at(self, row: int, column: int) -> NDArray[np.float64]:
-        """Unit normal (3,) at a pixel of a plane, or of a grid that `zero_doppler` made."""
+        """Unit normal (3,) at the pixel (row, column) of a plane, or of a grid that `zero_doppler` made."""
         down, right = self._steps_at(row, column)
         if self.is_plane:
             return self.normal
@@ -403,7 +424,7 @@ class ImageGrid:
         return box(p)
 
     def at(self, row: ArrayLike, column: ArrayLike) -> NDArray[np.float64]:
-        """Position, m (..., 3), of (fractional) pixel indices of a plane, or of a grid that `zero_doppler` made."""
+        """Position, m (..., 3), of (fractional) indices row, column of a plane, or of a grid by `zero_doppler`."""
         if self.times is not None and self.listed is not None:
             return listed_surface.at(self.listed, np.asarray(row), np.asarray(column))
         plane = self._plane("at")
@@ -413,7 +434,7 @@ class ImageGrid:
             return plane.center + i[..., None] * plane.y_axis + j[..., None] * plane.x_axis
 
     def index(self, position: ArrayLike) -> NDArray[np.float64]:
-        """Fractional (row, column) (..., 2) of positions, m (..., 3), projected on a plane or a `zero_doppler` grid."""
+        """Fractional (row, column) (..., 2) of a `position`, m (..., 3), projected on a plane or zero-Doppler grid."""
         if self.times is not None and self.listed is not None:
             return listed_surface.index(self.listed, np.asarray(position))
         plane = self._plane("index")

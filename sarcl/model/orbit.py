@@ -41,6 +41,23 @@ class Orbit:
     >>> place = orbit.geolocate(10.0, 900e3, heights=0.0)  # zero-Doppler time, s, and slant range, m
     >>> [round(float(value), 3) for value in orbit.locate(place)]
     [10.0, 900000.0]
+    >>> times = np.arange(0.0, 100, 10)  # s
+    >>> sampled = sarcl.Orbit.states(
+    ...     times, orbit.positions(times), orbit.velocities(times), epoch="2026-05-01T12:00:00"
+    ... )
+    >>> sampled.describe()[:25]
+    '10 state vectors every 10'
+    >>> t = round(float(sampled.seconds("2026-05-01T12:00:30")), 6)  # s since the epoch
+    >>> t, round(float(np.linalg.norm(sampled.accelerations(t))), 2)  # over the rotating Earth
+    (30.0, 8.16)
+    >>> pulses = orbit.trajectory(center=10.0, prf=1500, n_pulses=64)
+    >>> view = orbit.view(10.0, place)
+    >>> center, edge = orbit.boresight(10.0, look=0.5), orbit.footprint(10.0, look=0.5, width=(0.005, 0.03))
+    >>> station = sarcl.Orbit.tle(  # needs sarcl[orbits]
+    ...     "1 25544U 98067A   19343.69339541  .00001764  00000-0  38792-4 0  9991",
+    ...     "2 25544  51.6439 211.2001 0007417  17.6667  85.6398 15.50103472202482",
+    ... )
+    >>> precise = sarcl.Orbit.read("S1A_POEORB.EOF")
     """
 
     path: StateVectors | KeplerElements | TwoLineElements
@@ -90,10 +107,12 @@ class Orbit:
         j2: bool = False,
         span: Sequence[float] | None = None,
     ) -> Orbit:
-        """An elliptic orbit about the rotating Earth: semi-major axis in m, angles in rad, elements at time 0.
+        """An elliptic orbit about the rotating Earth; its elements hold at time 0.
 
-        node   of the ascending node. With an epoch (UTC): right ascension, from the mean equinox of date; Greenwich
-               mean sidereal time leads to the Earth-fixed frame. Without one: its longitude from Greenwich at time 0
+        semi_major_axis  m;  inclination, argument_of_perigee, mean_anomaly  rad
+        node   of the ascending node, rad. With an epoch (UTC): right ascension, from the mean equinox of date;
+               Greenwich mean sidereal time leads to the Earth-fixed frame. Without one: its longitude from Greenwich
+               at time 0
         j2     with the secular drift of node, perigee and anomaly that the Earth's oblateness causes
         span   (first, last) time, s, default half a revolution before and after time 0
 
@@ -115,7 +134,7 @@ class Orbit:
 
     @classmethod
     def tle(cls, line1: str, line2: str, *, span: Sequence[float] | None = None) -> Orbit:
-        """The orbit of two-line elements, by SGP4 (WGS72 constants): pip install sarcl[orbits].
+        """The orbit of two-line elements, line1 and line2, by SGP4 (WGS72 constants): pip install sarcl[orbits].
 
         SGP4's frame (TEME) is rotated by Greenwich mean sidereal time. The elements themselves are good to about 1 km
         at their epoch. span: (first, last) s from that epoch, default a day before and after.
@@ -155,15 +174,15 @@ class Orbit:
         return seconds(dates, self.epoch)
 
     def positions(self, t: ArrayLike) -> NDArray[np.float64]:
-        """Positions, m (..., 3), at times, s (...). ValueError for times outside the span."""
+        """Positions, m (..., 3), at times `t`, s (...). ValueError for times outside the span."""
         return self._states(t)[0]
 
     def velocities(self, t: ArrayLike) -> NDArray[np.float64]:
-        """Velocities over the rotating Earth, m/s (..., 3), at times, s (...): the derivative of the positions."""
+        """Velocities over the rotating Earth, m/s (..., 3), at times `t`, s (...): derivatives of the positions."""
         return self._states(t)[1]
 
     def accelerations(self, t: ArrayLike) -> NDArray[np.float64]:
-        """Derivatives of the velocities, m/s^2 (..., 3), at times, s (...), by differences over a second."""
+        """Derivatives of the velocities, m/s^2 (..., 3), at times `t`, s (...), by differences over a second."""
         t = self._times(t)
         before, after = (np.clip(t + d, *self.span) for d in (-DIFFERENCE, DIFFERENCE))
         return np.asarray((self.velocities(after) - self.velocities(before)) / (after - before)[..., None])
@@ -240,7 +259,7 @@ class Orbit:
         heights: ArrayLike | ElevationModel = 0.0,
         side: Literal["right", "left"] = "right",
     ) -> NDArray[np.float64]:
-        """Earth-fixed positions, m (..., 3), at zero-Doppler times, s (...), and slant ranges, m (...).
+        """Earth-fixed positions, m (..., 3), at zero-Doppler times `t`, s (...), and slant ranges `r`, m (...).
 
         heights  above the ellipsoid, m: a number, an array (...), or a `sarcl.ElevationModel`; where terrain has
                  several positions of one range (layover), the one closest to the point below the satellite is taken
@@ -264,7 +283,8 @@ class Orbit:
         return x.reshape(*times.shape, 3)
 
     def view(self, t: ArrayLike, positions: ArrayLike) -> viewing.View:
-        """View of Earth-fixed positions, m (..., 3), from the satellite at times, s (...): angles, ranges, Doppler."""
+        """View of Earth-fixed positions, m (..., 3), from the satellite at times `t`, s (...): angles, ranges,
+        Doppler."""
         x = places(positions)
         times, _ = together(t=self._times(t), positions=x[..., 0])
         p, v = self._states(times)
@@ -282,7 +302,7 @@ class Orbit:
         attitude: Attitude = "zero-doppler",
         height: float = 0.0,
     ) -> NDArray[np.float64]:
-        """Positions, Earth-fixed, m (..., 3), that the boresight meets at a height, m, at times, s (...).
+        """Positions, Earth-fixed, m (..., 3), that the boresight meets at a height, m, at times `t`, s (...).
 
         look, side, attitude  as in `trajectory`. The Doppler centroid and rate are those of `view` there.
         ValueError where the boresight passes over the horizon.
@@ -304,7 +324,7 @@ class Orbit:
         height: float = 0.0,
         n: int = 64,
     ) -> NDArray[np.float64]:
-        """Edge of a beam on the ground at a time, s: n positions around it, Earth-fixed, m (n, 3), at a height, m.
+        """Edge of a beam on the ground at a time `t`, s: n positions around it, Earth-fixed, m (n, 3), at a height, m.
 
         look, side, attitude  of the boresight, as in `trajectory`;  width  (azimuth, elevation) full angles between the
         edges, rad, of an elliptic beam. ValueError where the edge passes over the horizon.

@@ -53,6 +53,17 @@ class PhaseHistory(EchoRows):
     ... )
     >>> measured.n_rows, measured.n_samples == raw.n_samples
     (64, True)
+    >>> raw.read(8, 16).shape  # rows 8 ... 15
+    (8, 64)
+    >>> delay, signal = raw.time_signal(oversample=2)  # s about the delay of reference_range
+    >>> raw.save("echoes.h5")
+    >>> dataset = raw.to_xarray()  # needs sarcl[xarray]
+    >>> pulses = np.zeros((64, 256), np.complex64)  # receiver's samples, compressed in range
+    >>> sampled = sarcl.PhaseHistory.from_time(
+    ...     pulses, rate=400e6, start=4.7e-5, carrier=9.6e9, track=track, polarization=["HH", "HV"] * 32
+    ... )
+    >>> sampled.select(polarization="HV").n_rows
+    32
     """
 
     samples: Any

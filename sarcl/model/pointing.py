@@ -101,7 +101,7 @@ def steered(track: Trajectory, azimuth: ArrayLike, elevation: ArrayLike = 0.0) -
 
 
 def turned(track: Trajectory, angles: ArrayLike) -> Trajectory:
-    """The track's attitude rotated by rotation vectors, rad (3,) or (n, 3), in its own axes x, y, z.
+    """The track's attitude rotated by `angles`, rotation vectors, rad (3,) or (n, 3), in its own axes x, y, z.
 
     >>> aimed = sarcl.pointing.turned(sarcl.pointing.spotlight(track, (0, 0, 0)), (0.0, 0.0, 0.01))
     >>> aimed.attitude.shape
@@ -115,7 +115,8 @@ def turned(track: Trajectory, angles: ArrayLike) -> Trajectory:
 
 
 def from_quaternions(track: Trajectory, quaternions: ArrayLike, *, scalar_first: bool = True) -> Trajectory:
-    """Attitude from unit quaternions (n, 4), rotations from body to scene axes; w, x, y, z, or x, y, z, w.
+    """Attitude from unit quaternions (n, 4), rotations from body to scene axes: w, x, y, z if scalar_first,
+    else x, y, z, w.
 
     >>> level = np.tile([1.0, 0, 0, 0], (len(track.positions), 1))
     >>> sarcl.pointing.from_quaternions(track, level).attitude[0]

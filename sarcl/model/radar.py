@@ -29,6 +29,9 @@ class Radar:
 
     >>> radar = sarcl.Radar(power=5e3, losses_db=3, noise_temperature=600)
     >>> received = sarcl.echo(scene, chirp, track, radar=radar)  # samples in sqrt(W)
+    >>> level = radar.factor(9.6e9)  # sqrt(W) m
+    >>> float(radar.amplitude(9.6e9, tx_range=1e4, rx_range=1e4, tx_gain=1e2, rx_gain=1e2) / level)
+    0.0001
     """
 
     power: float
@@ -63,8 +66,11 @@ class Radar:
     ) -> NDArray[np.inexact]:
         """sqrt(W) received from a cross section of 1 m^2: factor x spreading x amplitude gains.
 
-        Its square is P G_t G_r lambda^2/((4 pi)^3 R_t^2 R_r^2 L). Ranges m; gains are amplitudes, sqrt(G), and may be
-        complex (`Antenna.gain`). Source: Skolnik, Radar Handbook, 3rd ed., ch. 1, for two antennas.
+        frequency           Hz (...);  tx_range, rx_range  from each antenna, m (...)
+        tx_gain, rx_gain    amplitude gains (...), sqrt(G), which may be complex (`Antenna.gain`)
+
+        Its square is P G_t G_r lambda^2/((4 pi)^3 R_t^2 R_r^2 L). Source: Skolnik, Radar Handbook, 3rd ed., ch. 1, for
+        two antennas.
         """
         named_gains = (("tx_gain", tx_gain), ("rx_gain", rx_gain))
         gains = [validation.values(name, gain, np.complex128) for name, gain in named_gains]
@@ -73,7 +79,7 @@ class Radar:
 
 
 def spreading(tx_range: ArrayLike, rx_range: ArrayLike) -> NDArray[np.float64]:
-    """1/(R_t R_r), 1/m^2. ValueError where a range is 0 or less: an antenna stands on a scatterer.
+    """1/(tx_range rx_range), 1/m^2. ValueError where a range is 0 or less: an antenna stands on a scatterer.
 
     >>> float(sarcl.radar.spreading(5e3, 1e4))
     2e-08
@@ -93,6 +99,8 @@ def spreading(tx_range: ArrayLike, rx_range: ArrayLike) -> NDArray[np.float64]:
 
 def noise_variance(raw: PhaseHistory, temperature: float, waveform: Waveform | None = None) -> NDArray[np.float64]:
     """Mean |noise|^2, W, of samples of the echoes `raw` at W = 1, one per row: k T_s/(df E), E the peak of |P|^2, s^2.
+
+    temperature  T_s of the system's noise, K;  waveform  of the pulse, None: that of `raw`
 
     A sample is the received spectrum over P's largest value (times the matched filter's, of peak 1, once compressed);
     noise of k T_s W/Hz over one period 1/df of the row contributes k T_s/df. A chirp has E = duration/bandwidth, so a

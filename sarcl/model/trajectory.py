@@ -33,6 +33,7 @@ class Trajectory(NotebookTable):
     >>> flight = sarcl.Trajectory.line(start=(-5e3, -50, 4e3), velocity=(0, 100, 0), prf=100, n_pulses=101)
     >>> flight.positions[50], flight.velocities[50]
     (array([-5000.,     0.,  4000.]), array([  0., 100.,   0.]))
+    >>> orbiting = sarcl.Trajectory.circle(radius=5e3, height=4e3, arc=0.1, n_pulses=101, speed=100)
     """
 
     times: NDArray[np.float64] | None
@@ -127,7 +128,7 @@ class Trajectory(NotebookTable):
 
     @classmethod
     def line(cls, *, start: ArrayLike, velocity: ArrayLike, prf: float, n_pulses: int) -> Trajectory:
-        """Straight track: pulse i at start + i velocity/prf (m, m/s, Hz)."""
+        """Straight track: pulse i < n_pulses at start + i velocity/prf (m, m/s, Hz)."""
         start = validation.array("start", start, np.float64, (3,))
         velocity = validation.array("velocity", velocity, np.float64, (3,))
         prf = validation.number("prf", prf, above=0)
@@ -151,7 +152,7 @@ class Trajectory(NotebookTable):
         prf: float | None = None,
         speed: float | None = None,
     ) -> Trajectory:
-        """Circle about the z axis through `center`, at `height` above it, m.
+        """Circle of a `radius`, m, about the z axis through `center`, at `height` above it, m.
 
         Pulse i is at azimuth start + arc i/(n_pulses - 1), rad from +x towards +y: the first pulse at
         `start`, the last at start + arc. Either prf (Hz) or speed (m/s) gives times and velocities; without both the

@@ -32,6 +32,10 @@ class Waveform:
     >>> chirp = sarcl.Waveform.chirp(center=9.6e9, bandwidth=300e6, duration=1e-6)
     >>> chirp.sweep_rate, abs(chirp.matched_spectrum(np.array([9.6e9])))
     (300000000000000.0, array([1.]))
+    >>> tone = sarcl.Waveform.tone(center=9.6e9, duration=1e-6)
+    >>> code = sarcl.Waveform.sampled(np.repeat([1, 1, 1, -1, 1], 8), rate=400e6, center=9.6e9)  # Barker, 5 chips
+    >>> tone.pulse_spectrum(np.array([9.6e9, 9.601e9])).round(2)
+    array([1.+0.j, 0.+0.j])
     """
 
     center: float

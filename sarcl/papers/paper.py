@@ -240,7 +240,7 @@ class Paper:
         }
 
     def html(self, sections: Sequence[Section], quick: bool, command: str = "") -> str:
-        """The page of the finished sections: pictures, the table of all rows, sections with figures, terms, about.
+        """The page of the finished sections: pictures, terms, the table of all rows, sections with figures, about.
 
         command  the line that made the page, printed on it
         """
@@ -252,9 +252,8 @@ class Paper:
         if quick:
             blocks.append(words(f"A quick run: {self.quick}", True))
         rows = [row for section in sections for row in section.rows]
-        blocks += [*strip(figures), *_conclusion(rows, self.main), *figures]
-        if self.terms:
-            blocks += [heading("Terms"), terms(self.terms)]
+        defined = [terms(self.terms, "Terms that this page uses")] if self.terms else []
+        blocks += [*strip(figures), *defined, *_conclusion(rows, self.main), *figures]
         blocks += [heading("About this page"), words(self.about)]
         blocks.append(words(f"Measured in {duration(sum(s.seconds for s in sections))}.", True))
         return page(self.title, blocks, command)
@@ -264,8 +263,9 @@ def _conclusion(rows: Sequence[Row], main: Sequence[str]) -> list[Block]:
     """Numbers of rows that agree, and the table of all rows; main: items of the rows that come first."""
     published, others = ([row for row in rows if (row.basis == "paper") == printed] for printed in (True, False))
     of_cause = {meaning: [row for row in published if not row.holds and row.cause == c] for c, meaning in CAUSES}
-    counts = ", ".join(f"{len(of)} {meaning.split(':')[0].lower()}" for meaning, of in of_cause.items() if of)
+    counts = ", ".join(_counted(len(of), meaning.split(":")[0].lower()) for meaning, of in of_cause.items() if of)
     n_right = sum(row.holds for row in published)
+    n_wrong = len(published) - n_right
     ordered: list[Row] = []
     heads = {}
     groups = [
@@ -283,7 +283,7 @@ def _conclusion(rows: Sequence[Row], main: Sequence[str]) -> list[Block]:
         heading("Conclusion"),
         words(
             f"{n_right} of {len(published)} published values and statements agree with what was measured in this run. "
-            f"{len(published) - n_right} differ{f': {counts}' if counts else ''}."
+            f"{n_wrong} {'differs' if n_wrong == 1 else 'differ'}{f': {counts}' if counts else ''}."
         ),
         table(
             ["item", "published or expected" if others else "published", "measured", "verdict", "why"],
@@ -293,6 +293,12 @@ def _conclusion(rows: Sequence[Row], main: Sequence[str]) -> list[Block]:
             groups=heads,
         ),
     ]
+
+
+def _counted(n: int, plural: str) -> str:
+    """A number of things; the first word of `plural` loses its s where there is one thing."""
+    noun, *others = plural.split()
+    return " ".join([str(n), noun.removesuffix("s") if n == 1 else noun, *others])
 
 
 def _meaning(others: Sequence[Row]) -> str:

@@ -65,6 +65,15 @@ class Scenario:
     >>> scenario = sarcl.Scenario(waveform=chirp, trajectory=track, scene=scene, grid=grid)
     >>> scenario.focus(scenario.simulate()).shape
     (128, 128)
+    >>> again = sarcl.scenario.loads(scenario.dumps())
+    >>> again.save("small.toml")
+    >>> again.plan(tolerance=1e-2).run().n_rows, again.plan_focus(raw).run().shape
+    (64, (128, 128))
+    >>> parts = again.build_waveform(), again.build_track(), again.build_scene(), again.build_grid()
+    >>> kepler = {"semi_major_axis": 7.07e6, "eccentricity": 0, "inclination": 1.71}
+    >>> orbit = sarcl.Scenario(orbit={"kepler": kepler}).build_orbit()
+    >>> again.build_receiver(), again.build_antenna(), again.build_array(), again.build_radar(), again.build_place()
+    (None, None, None, None, None)
     """
 
     waveform: Waveform | Table | None = None
@@ -119,7 +128,7 @@ class Scenario:
         return toml.dumps(self.tables)
 
     def save(self, path: PathLike) -> None:
-        """Write the scenario to a file. Names of mesh files stay relative to the folder of the file."""
+        """Write the scenario to a file, `path`. Names of mesh files stay relative to the folder of the file."""
         from ..io import output_paths
 
         with output_paths.atomic(arguments.path("path", path)) as part:
@@ -246,13 +255,13 @@ class Scenario:
     def plan_focus(
         self, raw: PhaseHistory, grid: ImageGrid | None = None, **options: Unpack[BackprojectKeywords]
     ) -> Forecast[Image]:
-        """Forecast of `focus` with these options, as `sarcl.plan` makes it; its run() returns the image."""
+        """Forecast of `focus(raw, grid)` with these options, as `sarcl.plan` makes it; its run() returns the image."""
         forecast: Forecast[Image] = _focusing.call_of(self, raw, grid, options).plan()
         return forecast
 
 
 def load(path: PathLike) -> Scenario:
-    """Read a scenario file; mesh files are found relative to its folder.
+    """The scenario of a file, `path`; mesh files are found relative to its folder.
 
     ValueError names file and line where the text is not TOML or not a scenario; FileNotFoundError.
 
@@ -274,7 +283,9 @@ def load(path: PathLike) -> Scenario:
 
 
 def loads(text: str, *, name: str = "scenario", folder: PathLike = ".") -> Scenario:
-    """A scenario from TOML text; messages name the file `name`. Raises as `load` does.
+    """A scenario from TOML text. Raises as `load` does.
+
+    name  of the file, in messages;  folder  that names of mesh files are relative to
 
     >>> small = '''
     ... waveform.chirp = {center = 9.6e9, bandwidth = 150e6, duration = 2e-6}

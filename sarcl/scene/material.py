@@ -49,6 +49,11 @@ class Material:
     >>> field = sarcl.Scene.from_heights([0, 5, 10], [0, 5, 10], np.zeros((3, 3)), material=wet)
     >>> field.materials[0].eps_r
     (15-3j)
+    >>> salty = sarcl.Material(eps_r=15, conductivity=0.1)
+    >>> np.round(salty.permittivity([1e9, 10e9]), 2)
+    array([15.-1.8j , 15.-0.18j])
+    >>> salty.at(1e9).conductivity, float(sarcl.Material(height=0.004, diagram="cos").lobe(0.0))
+    (0.1, 1.0)
     """
 
     eps_r: complex = None  # type: ignore[assignment]

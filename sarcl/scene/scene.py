@@ -56,6 +56,15 @@ class Scene(NotebookTable):
     >>> scene = ground + house.on(ground, 5, 0) + lamp
     >>> len(scene.triangles), len(scene.positions)
     (20, 1)
+    >>> ground.height_at(5, 0), scene.moved((0, 0, 2)).bounds[0]
+    (0.0, array([-20., -20.,   2.]))
+    >>> sarcl.Scene.facets([[[0, 0, 0], [1, 0, 0], [0, 1, 0]]], material="metal").split(max_edge=0.8).triangles.shape
+    (4, 3, 3)
+    >>> import trimesh
+    >>> body = sarcl.Scene.from_mesh(trimesh.creation.box((4, 2, 3)), max_edge=1.0)
+    >>> rough = sarcl.Scene.from_heights([0, 1, 2], [0, 1, 2], np.zeros((3, 3)), point_roughness=0.01).realized(seed=1)
+    >>> on_site = scene.on_earth(longitude=7.01, latitude=46.005, height=640)
+    >>> alps = sarcl.Scene.from_dem("terrain.tif", heights="ellipsoid")  # needs sarcl[maps]
     """
 
     positions: NDArray[np.float64]
@@ -290,7 +299,7 @@ class Scene(NotebookTable):
         point_roughness: ArrayLike = 0.0,
         external: bool = False,
     ) -> Scene:
-        """Terrain from an elevation model that rasterio reads (GeoTIFF and others), on WGS84: pip install sarcl[maps].
+        """Terrain from an elevation model, file `path`, that rasterio reads (GeoTIFF ...): pip install sarcl[maps].
 
         bounds   (west, south, east, north), degrees, default the whole file
         center   (longitude, latitude[, height]), degrees and m: origin of the local frame, default the centre of the

@@ -114,7 +114,7 @@ def cylinder(
     sections: int | None = None,
     **options: Unpack[ClosedOptions],
 ) -> Scene:
-    """An upright circular cylinder with its lids.
+    """An upright circular cylinder with its lids: radius and height, m.
 
     >>> len(sarcl.shapes.cylinder(2, 4).triangles)
     288
@@ -131,7 +131,7 @@ def cone(
     sections: int | None = None,
     **options: Unpack[ClosedOptions],
 ) -> Scene:
-    """An upright circular cone with its base.
+    """An upright circular cone with its base: radius and height, m.
 
     >>> len(sarcl.shapes.cone(3, 5).triangles)
     144
@@ -149,7 +149,7 @@ def frustum(
     sections: int | None = None,
     **options: Unpack[ClosedOptions],
 ) -> Scene:
-    """A truncated cone of radii `bottom` and `top` with its lids; sections=4 makes it a truncated pyramid.
+    """A truncated cone of a height and radii `bottom` and `top` with its lids; sections=4 makes it a truncated pyramid.
 
     >>> len(sarcl.shapes.frustum(3, 1, 4).triangles)
     288
@@ -255,7 +255,8 @@ def top_hat(
     two_sided: ArrayLike = True,
     **options: Unpack[SurfaceOptions],
 ) -> Scene:
-    """An upright cylinder with its lid on a disc about the origin: a dihedral from all sides.
+    """An upright cylinder (cylinder_radius, height, m) with its lid on a disc about the origin (disc_radius, m): a
+    dihedral from all sides.
 
     >>> target = sarcl.shapes.top_hat(1.0, 0.3, 0.8, position=(0, 0, 0.1))
     >>> target.bounds[1]

@@ -45,7 +45,7 @@ def __getattr__(name: str) -> Any:
 
 
 def plan(*args: Any, **options: Any) -> Forecast[Any]:
-    """Forecast of a verb: plan(verb, ...) with the arguments of `verb(...)`, before any work.
+    """Forecast of a verb: plan(verb, *args, **options) with the arguments of `verb(...)`, before any work.
 
     plan(sarcl.echo, scene, waveform, track, tolerance=1e-3) forecasts those echoes; plan(raw, grid, ...) is short for
     plan(sarcl.backproject, raw, grid, ...). Options that only a run has (check, progress, out, resume, tile, cluster)

@@ -549,7 +549,7 @@ def rcs(
 
 @overload
 def plan(verb: Callable[_P, _R], /, *args: _P.args, **options: _P.kwargs) -> Forecast[_R]:
-    """Forecast of a verb: plan(verb, ...) with the arguments of `verb(...)`, before any work."""
+    """Forecast of a verb: plan(verb, *args, **options) with the arguments of `verb(...)`, before any work."""
 
 @overload
 def plan(
@@ -574,4 +574,4 @@ def plan(
     check: bool | None = None,
     progress: Progress | None = None,
 ) -> Forecast[Image]:
-    """Forecast of a verb: plan(verb, ...) with the arguments of `verb(...)`, before any work."""
+    """Forecast of a verb: plan(verb, *args, **options) with the arguments of `verb(...)`, before any work."""

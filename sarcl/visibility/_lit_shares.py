@@ -39,8 +39,9 @@ def facet_shares(
 
     Exact, as `echo` takes it: facets are clipped along the shadows' edges, and one-sided ones that face away are dark.
 
-    device    leaves this to another device on the machine where it has no float64;  progress  called as
-              progress(pulse, pulses)
+    track, receiver  of the transmitter, and of the receiver where it is another one
+    device           leaves this to another device on the machine where it has no float64
+    progress         called as progress(pulse, pulses)
 
     ValueError for a scene without facets, or a receiver of another length; MemoryError for more shares than memory
     holds; NoDeviceError where no device has float64. Source: docs/theory/shadows.md.
@@ -85,8 +86,11 @@ def pixel_shares(
     float32, of the shape of the grid; NaN at empty cells. A shadow mask is `pixel_shares(...) < 0.5`. Pixels are where
     the grid puts them: give a grid on the ground (ImageGrid.on_terrain), since those below it are in shadow.
 
+    track, receiver  of the transmitter, and of the receiver where it is another one
     tolerance  looks are taken from more and more pulses, until twice as many change no more than one pixel in 1000 by
-               more than this;  progress  called as progress(look, looks), of the looks that are taken at that time
+               more than this
+    device     see `sarcl.devices`
+    progress   called as progress(look, looks), of the looks that are taken at that time
 
     Facets within 1e-6 of the scene's size of a pixel do not hide it. ValueError for a scene without facets, a receiver
     of another length, or a tolerance of 0. Source: docs/theory/shadows.md.

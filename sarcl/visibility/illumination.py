@@ -98,6 +98,8 @@ class Illumination:
     >>> light = sarcl.illumination.lit(box.triangles, track.positions, two_sided=False)
     >>> light.fraction_at(20).shape, light.blocks.shape == (len(light.viewpoints), 2)
     ((12,), True)
+    >>> float(light.fraction(0).max())  # share of each facet that is lit at the first viewpoints
+    1.0
     """
 
     blocks: np.ndarray
@@ -274,9 +276,10 @@ def lit(
     max_bytes: float | None = None,
     device: DeviceChoice | None = None,
 ) -> Illumination:
-    """Shares of facets, m (k, 3, 3), that both antennas, m (n_pulses, 3), see past one another, in blocks of pulses.
+    """Shares of facets that both antennas see past one another, in blocks of pulses.
 
-    rx          default tx
+    triangles   corners of the facets, m (k, 3, 3)
+    tx, rx      positions of the antennas, m (n_pulses, 3), rx by default those of tx;  device  see `sarcl.devices`
     two_sided   (k,) bool or one for all: the other facets are not illuminated where they face away from an antenna
     tolerance   largest change of a share between the pulses of a block, for the facet of median size: shares are
                 computed at one pulse of a block at most; blocks become shorter where the accuracy asks for it

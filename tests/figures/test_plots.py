@@ -76,6 +76,12 @@ def test_ticks_have_whole_values_without_offset_or_common_power(figures, y):
     assert high - low >= 0.999 * plots.LEAST_SPAN * max(map(abs, y)) and low <= min(y) <= max(y) <= high
 
 
+def test_twenty_curves_have_twenty_looks():
+    looks = [plots.style(i) for i in range(20)]
+    assert len({(look["color"], look["linestyle"], look["marker"]) for look in looks}) == 20
+    assert len({(look["linestyle"], look["marker"]) for look in looks}) == 20  # without colours
+
+
 def test_one_point_is_a_marker_with_its_value_and_no_curve(figures):
     plots.curves([("dip", [0.2], [13.94494]), ("law", [0.1, 0.3], [1, 20])], "x", "y")
     plots.curves([("dip", [0.2], [13.94494])], "x", "y")
@@ -137,6 +143,7 @@ def test_a_page_escapes_its_text_and_names_what_made_it():
     blocks = [
         html.heading("A & b", 3, "top"), html.words("<p>"), html.words("small", note=True), html.listed(["1 < 2", "x"]),
         html.terms([("dB", "10 log10 & so on")]),
+        html.terms([("m", "metre")], "Folded"),
         html.table(["<h>", "n"], [["a & b", 1.5], ["c", "d"]], "c < d", marked=[1]),
         html.plot([("a", [0, 1], [0, 1])], "x", "y", "caption > 0"),
     ]  # fmt: skip
@@ -152,6 +159,7 @@ def test_a_page_escapes_its_text_and_names_what_made_it():
     assert (
         tree.findall(".//tr")[2].attrib == {"class": "marked"} and tree.find(".//p[@class='caption']").text == "c < d"
     )
+    assert [[n.text for n in d.iter() if n.text] for d in tree.iter("details")] == [["Folded", "m", "metre"]]
     figure = tree.find(".//figure")
     assert figure.find("figcaption").text == "caption > 0" and figure.find("img").attrib["alt"] == "y against x: a"
     kind, data = figure.find("img").attrib["src"].split(",")
@@ -175,6 +183,9 @@ def test_a_strip_leads_to_one_figure_of_each_section_pictures_first():
     same = [html.heading("A"), {**plot[0]}, html.heading("B"), {**plot[0]}]
     assert [text for _, _, text in html.strip(same)[0]["figures"]] == ["A: C0", "B: C0"]
     assert html.strip([html.words("no figure")]) == []
+    chosen = html.picture([[0.0, -9.0]], (0, 1), (0, 1), "x", "y", "P9.", chosen=True)
+    targets = [block for name in "ABCD" for block in (html.heading(name), *picture[:1], {**chosen})]
+    assert [text for _, _, text in html.strip(targets)[0]["figures"]] == [f"{name}: P9" for name in "ABCD"]
 
 
 def test_a_table_of_words_has_groups_notes_and_the_head_of_every_cell():

@@ -155,7 +155,7 @@ def test_steered_turned_and_quaternions_are_the_same_turns():
     assert np.allclose(pointing.turned(aimed, turn).attitude, level)
     from scipy.spatial.transform import Rotation
 
-    xyzw = Rotation.from_matrix(level).as_quat()
+    xyzw = Rotation.from_matrix(level.copy()).as_quat()  # SciPy 1.13 takes no array that is read-only
     assert np.allclose(pointing.from_quaternions(TRACK, np.roll(xyzw, 1, axis=1)).attitude, level)
     assert np.allclose(pointing.from_quaternions(TRACK, xyzw, scalar_first=False).attitude, level)
 

@@ -52,5 +52,6 @@ def test_the_command_writes_a_page_on_which_all_but_the_errata_agree(tmp_path):
     assert document["finished"] and {row["item"]: row["cause"] for row in rows if not row["holds"]} == causes
     assert set(papers.find("saras").main) <= {row["item"] for row in rows}
     text = (tmp_path / "saras.html").read_text()
-    assert text.index("Conclusion") < text.index("<figure") < text.index(">Terms<")
+    assert text.index(">Terms that") < text.index("Conclusion") < text.index("<figure")
+    assert f"{len(MISPRINTED) + 1} differ: {len(MISPRINTED)} errors in print, 1 difference of interpretation." in text
     assert "sarcl papers saras --quick" in text and "A quick run" in text

@@ -58,6 +58,10 @@ class Case:
     >>> case = sarcl.fda.Case("array", n=9, frequency_step=100e6)
     >>> case.n, case.frequency_step
     (9, 100000000.0)
+    >>> len(case.track().positions), case.array().n, case.channels().n
+    (431, 9, 9)
+    >>> raw = case.collect([0.0, 2.0])  # echoes of two points
+    >>> peer = case.conventional([0.0, 2.0])
     """
 
     name: str
@@ -249,14 +253,16 @@ class Case:
         return self.array() if self.groups is None else as_channels(self.array(), self.groups)
 
     def collect(self, places: Sequence[float], device: DeviceChoice | None = None) -> PhaseHistory:
-        """Echoes of unit points at (0, y, 0): channels added up at the reference element, or kept separate."""
+        """Echoes of unit points at (0, y, 0), y of `places`, m, computed on a `device`: channels added up at the
+        reference element, or kept separate."""
         tone = Waveform.tone(center=self.center, duration=1 / self.channel_step)
         kept = "simultaneous" if self.receive == "reference" else "separated"
         raw = self._echo(places, tone, self.track(), device, array=self.array(), channels=kept, receive=self.receive)
         return raw if self.groups is None else replace(raw, array=self.channels())
 
     def conventional(self, places: Sequence[float], device: DeviceChoice | None = None) -> PhaseHistory:
-        """Echoes of the same points with a conventional antenna: the same phase centres and track, a chirp of the band.
+        """Echoes of the points of `places`, m, on a `device`, with a conventional antenna: the same phase centres and
+        track, a chirp of the band.
 
         One antenna at the mean phase centre; where phase centres spread (`is_wide`), an element for each channel. All
         send the chirp; their echoes are kept separate, and received as the array's channels are.

@@ -52,7 +52,7 @@ def run(
     device: DeviceChoice | None = None,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> list[dict[str, Any]]:
-    """Measurements of each case: plain numbers, ready for JSON.
+    """Measurements of each of the `cases` on a `device`: plain numbers, ready for JSON; progress(name, case, cases).
 
     >>> case = sarcl.fda.Case("array", n=9, frequency_step=100e6, mappings=("corrected",))
     >>> [measured["name"] for measured in sarcl.fda.run([case])]
@@ -72,7 +72,8 @@ def run(
 
 
 def measure(case: Case, device: DeviceChoice | None = None) -> dict[str, Any]:
-    """Responses of every point, pairs at every separation and spatial frequencies, for every mapping that applies.
+    """Responses of every point, pairs at every separation and spatial frequencies, for every mapping that applies,
+    computed on a `device`.
 
     "not_applicable" holds the other mappings, with the reason; "collected" the spatial frequencies of the channels;
     "resolved_if" the limits of what `pair` measures within which two points are resolved (`is_resolved`).
@@ -134,7 +135,8 @@ def _map(case: Case, raw: PhaseHistory, name: str) -> PhaseHistory:
 
 
 def cut(raw: PhaseHistory, case: Case, y: float, device: DeviceChoice | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Image along cross-range about (0, y, 0): positions, m (n,), and amplitudes (n,), 1 for a focused unit point.
+    """Image of `raw`, on a `device`, along cross-range about (0, y, 0): positions, m (n,), and amplitudes (n,), 1 for a
+    focused unit point.
 
     >>> case = sarcl.fda.Case("array", n=9, frequency_step=100e6)
     >>> across, amplitudes = sarcl.fda.cut(raw, case, 0.0)
@@ -151,6 +153,8 @@ def cut(raw: PhaseHistory, case: Case, y: float, device: DeviceChoice | None = N
 
 def response(at: np.ndarray, values: np.ndarray, place: float) -> dict[str, float]:
     """Response of a point: error of the peak's position, m; its level, dB; null, half-power width, m; PSLR, ISLR, dB.
+
+    at  positions of the cut, m (n,);  values  of the image there (n,);  place  of the point, m
 
     "inside" is False where the highest value is the first or last of the cut, and therefore no peak.
 
@@ -201,6 +205,8 @@ def _crossing(x: np.ndarray, power: np.ndarray, i: int, side: int) -> float:
 def dip(at: np.ndarray, values: np.ndarray, separation: float) -> float:
     """Fall of the image between two points, dB below the lower of their peaks; 0 where there is only one peak.
 
+    at  positions, m (n,);  values  amplitudes there (n,);  separation  of the points, m
+
     >>> at = np.linspace(-10, 10, 401)  # m
     >>> values = np.sinc(at - 1) + np.sinc(at + 1)  # two points, nulls 1 m from each
     >>> sarcl.fda.dip(at, abs(values), separation=2.0) > 20
@@ -210,7 +216,9 @@ def dip(at: np.ndarray, values: np.ndarray, separation: float) -> float:
 
 
 def pair(at: np.ndarray, values: np.ndarray, separation: float) -> Pair:
-    """Response on a cut, m (n,) and amplitudes of a unit point (n,), of two points `separation` m apart about 0.
+    """Response on a cut of two points `separation` m apart about 0.
+
+    at  positions of the cut, m (n,);  values  of the image there, amplitudes of a unit point (n,)
 
     dip_db    the `dip`, dB;  level_db  the lower of the two peaks, dB
     shift     larger distance of the two peaks from their points, m
@@ -332,7 +340,7 @@ def _support(frequencies: np.ndarray) -> dict[str, Any]:
 
 
 def spatial_frequencies(raw: PhaseHistory, most: int = 40) -> np.ndarray:
-    """K = f/c (u_T + u_R) at the origin, of up to `most` samples per row, cycles/m (n, 2): along x and y.
+    """K = f/c (u_T + u_R) at the origin, of up to `most` samples per row of `raw`, cycles/m (n, 2): along x and y.
 
     >>> sarcl.fda.spatial_frequencies(raw).shape[1]
     2

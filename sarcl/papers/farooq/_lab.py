@@ -69,12 +69,18 @@ class Lab:
         image = backproject(raw, grid, tolerance=1e-3, check=False, device=self.device)
         return np.maximum(image.decibels().T, -200.0)
 
-    def picture(self, raw: PhaseHistory, caption: str, zoom: float = 1.0, box: float | None = None) -> html.Block:
-        """The image as a figure, white where it is brightest; box: half the side of a dashed square, m."""
+    def picture(
+        self, raw: PhaseHistory, caption: str, zoom: float = 1.0, box: float | None = None, unit: float = 1.0
+    ) -> html.Block:
+        """The image as a figure, white where it is brightest; box: half the side of a dashed square, m.
+
+        unit  amplitude of a focused unit point, which has 0 dB
+        """
         edges = (-HALF[1] / zoom, HALF[1] / zoom), (-HALF[0] / zoom, HALF[0] / zoom)
         square = None if box is None else (box, box)
+        levels_db = self.image(raw, zoom) - 20 * np.log10(unit)
         return html.picture(
-            self.image(raw, zoom), *edges, "cross-range, m", "range, m", caption, floor_db=-30.0, box=square, equal=True
+            levels_db, *edges, "cross-range, m", "range, m", caption, floor_db=-30.0, box=square, equal=True
         )
 
     def cut(

@@ -32,7 +32,9 @@ def section(lab: Lab) -> Section:
             null = lab.measure(point, axis)["null"]
             out.number("{name}: first null in {way}", null, expected=PRINTED, name=name, way=way)
         caption = f"{name}: 13 points (figure {'2.13' if name == 'LFM' else '2.14'})."
-        figures.append(lab.picture(lab.single(case, waveform, DIAMOND), caption))
+        # the tone's spectrum fills a sixteenth of the samples' band, which lowers all levels alike
+        unit = float(curves["range"][name][1].max())
+        figures.append(lab.picture(lab.single(case, waveform, DIAMOND), caption, unit=unit))
     _shapes(out, curves)
     out.say()
     out.draw(*figures)

@@ -29,7 +29,7 @@ SLANT, PRF = 1.05e6, 1700.0  # m: 45 deg of incidence; Hz
 SCALE = 8.0  # of the solids; the paper gives no sizes
 FOOT, CUBOID, TOP = (18.0, 12.0, 4.0), (14.0, 14.0, 6.0), (5.0, 6.0)  # radii and height; sides; radius and height
 SIDES = (34.0, 50.0)  # half the ground along azimuth and range
-LOOK: dict[str, Any] = {"floor_db": -30.0, "percentile": 99.5, "equal": True}  # of pictures
+LOOK: dict[str, Any] = {"floor_db": -30.0, "percentile": 99.5, "unit": "dB re the median", "equal": True}  # of pictures
 PULSES, LOOKS, CELL = {True: 900, False: 1400}, {True: 2, False: 8}, 2.5  # m, cells of the ground
 
 
@@ -157,4 +157,5 @@ def _shadow(out: Section, power: np.ndarray, grid: ImageGrid, tangent: float) ->
 
 
 def _db(power: np.ndarray) -> np.ndarray:
-    return np.asarray(10 * np.log10(np.maximum(power, 1e-9 * power.max())))
+    """dB over the median pixel, which is ground: the scale that figures 6 to 8 have in common."""
+    return np.asarray(10 * np.log10(np.maximum(power, 1e-9 * power.max()) / np.median(power)))

@@ -11,7 +11,7 @@ from ..paper import Section
 from ._radar import l_band
 
 ROUGHNESS, EPS = 0.15, 3.0  # m (no unit is printed), section 6.1
-SIDES = (0.5, 0.75)  # m, of the squares of two facets: 226 and 100 facets per resolution cell
+SIDES = (0.5, 0.75)  # m, of the squares of two facets: 227 and 101 facets per resolution cell
 CELLS = {True: 40, False: 96}
 CHANCE = 1.63  # over the root of the number of pixels: exceeded by chance once in 100 (Kolmogorov and Smirnov)
 FINITE = 0.01  # difference of distribution functions that a finite number of facets per cell may cause

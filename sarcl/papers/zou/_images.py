@@ -55,7 +55,9 @@ def section(name: str, lab: Lab) -> Section:
         out.draw(view.picture(np.abs(np.asarray(image.data)) / image.gain, caption))
     images = {polarization: np.abs(view.backprojected(raw)) for polarization, raw in raws.items()}
     for polarization, pixels in images.items():
-        out.draw(view.picture(pixels, f"{polarization}, backprojection of the echoes."))
+        # unlike the chirps of the receiver's field, these pictures differ from target to target: for the page's head
+        caption = f"{polarization}, backprojection of the echoes."
+        out.draw(view.picture(pixels, caption, chosen=polarization == "HH"))
     optics = lab.optics(name)
     flat = np.abs(view.backprojected(optics))
     out.draw(view.picture(flat, "HH by physical optics (sarcl.echo), backprojection of the echoes."))
@@ -126,12 +128,12 @@ class _View:
             device=self.lab.device,
         )
 
-    def picture(self, amplitude: np.ndarray, caption: str) -> html.Block:
-        """Pixels, m, with the outline."""
+    def picture(self, amplitude: np.ndarray, caption: str, chosen: bool = False) -> html.Block:
+        """Pixels, m, with the outline; chosen: for the head of the page."""
         ends = -self.half, self.half
         return html.picture(
             _db(amplitude), ends, ends, RANGE_NAME, AZIMUTH_NAME, caption, floor_db=FLOOR, lines=self.outline,
-            unit=LEVEL, equal=True,
+            unit=LEVEL, equal=True, chosen=chosen,
         )  # fmt: skip
 
 
