@@ -31,6 +31,7 @@ from .factorized.plan import FactorPlan
 from .float64 import direct as float64_direct
 from .float64 import plan as float64_plan
 from .focusing_task import FocusingTask
+from .row_norms import row_norms
 from .tiling.of_grid import tiling_of
 from .tiling.tiling import Tiling
 
@@ -159,7 +160,7 @@ class Float32Methods:
     """
 
     def __init__(self, task: FocusingTask, tolerance: float) -> None:
-        strongest = float(profile_energy.row_norms(task).max()) / np.sqrt(task.raw.n_samples)
+        strongest = float(row_norms(task).max()) / np.sqrt(task.raw.n_samples)
         if 0 < strongest < TINY:
             raise ValueError(
                 f"samples times weights reach {strongest:.1e}; complex64 loses digits below {TINY:.0e}: scale the "
