@@ -22,8 +22,7 @@ import numpy as np
 
 from sarcl import ToleranceMissed, ToleranceUnreachable
 from sarcl.opencl import choose_device, fft, native_functions
-from sarcl.opencl._host_arrays import PageLocked
-from sarcl.opencl.device import Device, Limits
+from sarcl.opencl.device import Device, Limits, PageLocked
 from sarcl.opencl.device_list import DeviceInfo
 from sarcl.opencl.launch_numbers import struct_layout
 from sarcl.opencl.native_functions import sincos_error

@@ -12,9 +12,11 @@ import pytest
 from helpers.cases import noise_history
 
 import sarcl
+from sarcl.base.errors import ToleranceUnreachable
 from sarcl.blocks.bands import LEAST_BYTES, pages_in_use
 from sarcl.imaging import row_norms
-from sarcl.imaging.choose_method import MOST_CHOICES, choose
+from sarcl.imaging.choose_method import MOST_CHOICES, STEPS, choose
+from sarcl.imaging.direct import direct
 from sarcl.imaging.focusing_task import make_task
 from sarcl.model.lazy_rows import is_constant
 from sarcl.numerics.cost_model import CPU
@@ -69,6 +71,39 @@ def test_few_choices_are_kept_and_none_longer_than_the_echoes():
     assert last() is None and echoes() is None
 
 
+@pytest.mark.parametrize("lazy", [False, True])
+def test_other_samples_of_the_same_geometry_follow_the_same_plan(lazy, monkeypatch):
+    raw, planned, make_plan = noise_history(seed=3), [], direct.make_plan
+    monkeypatch.setattr(direct, "make_plan", lambda *wanted: planned.append(wanted) or make_plan(*wanted))
+    looks = [raw, *(replace(raw, samples=s) for s in (7 * raw.samples, np.roll(raw.samples, 1, axis=0)))]
+    if lazy:
+        looks = [replace(look, samples=LazyRows(look)) for look in looks]
+    choices = [chosen(look) for look in looks]
+    assert len({id(choice.plan) for choice in choices}) == 1 and len(planned) == 1
+    assert all(choice.predicted_error <= 1e-2 for choice in choices)
+    image = sarcl.backproject(looks[1], plane(), tolerance=1e-2, check=True, device="cpu")
+    assert image.report.measured_error <= image.report.predicted_error
+    assert chosen(replace(raw, tx=raw.tx + 1.0)).plan is not choices[0].plan
+    assert chosen(raw, tolerance=9.8e-3).plan is not choices[0].plan and len(planned) == 3
+
+
+def test_a_tolerance_that_only_the_exact_one_meets_is_planned_for_it(monkeypatch):
+    raw, planned, make_plan = noise_history(seed=4), [], direct.make_plan
+    monkeypatch.setattr(direct, "make_plan", lambda *wanted: planned.append(wanted[1]) or make_plan(*wanted))
+    chosen(raw)
+
+    def refusing(task, tolerance, devices):
+        planned.append(tolerance)
+        if len(planned) == 2:
+            raise ToleranceUnreachable(tolerance, None, "a stub", "")
+        return make_plan(task, tolerance, devices)
+
+    monkeypatch.setattr(direct, "make_plan", refusing)
+    assert chosen(replace(raw)).plan.predicted_error <= planned[2]
+    rounded, again, exact = planned
+    assert rounded == again < exact < 1e-2 and exact / rounded < 1 + 2 / STEPS
+
+
 def test_an_image_of_a_kept_choice_has_the_bits_of_the_first():
     raw = noise_history()
     first, second = (sarcl.backproject(raw, plane(), tolerance=1e-2, device="cpu") for _ in range(2))
@@ -108,11 +143,12 @@ def test_the_largest_part_is_known_of_samples_that_cannot_change():
     assert replace(raw, samples=view[:]).largest_part is None
 
 
-@pytest.mark.parametrize("kind", [np.complex64, np.complex128])
-def test_pages_are_used_without_a_change_of_values(kind):
-    values = np.random.default_rng(0).standard_normal((4, LEAST_BYTES // 8)).astype(kind)
+@pytest.mark.parametrize("kind, rows", [(np.complex64, 4), (np.complex128, 4), (np.complex64, 10)])
+def test_pages_are_used_without_a_change_of_values(kind, rows, monkeypatch):
+    monkeypatch.setenv("SARCL_THREADS", "4")  # of which two use the pages of the largest
+    values = np.resize(np.arange(1000, dtype=kind), (rows, LEAST_BYTES // 8))
     before = values.copy()
-    with pages_in_use(SimpleNamespace(is_cpu=False), values, slice(1, 3)):
+    with pages_in_use(SimpleNamespace(is_cpu=False), values, slice(1, rows - 1)):
         pass
     assert np.array_equal(values, before)
 
