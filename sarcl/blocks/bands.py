@@ -12,9 +12,11 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from ..base.stage_timer import Clock
+from ..base.threads import threads
 from ..opencl.device import Device
 
 LEAST_BYTES = 2**24  # of new rows whose memory a thread asks for: below, it takes longer to start one
+PAGES_BYTES = 2**26  # of new rows per thread, at least: the system clears them in about 20 ms
 
 Run = tuple[int, int]  # bands first ... last - 1
 
@@ -31,21 +33,23 @@ class FlatArray(Protocol):
 def pages_in_use(device: Device, flat: FlatArray, rows: slice) -> Iterator[None]:
     """Context for the work of a GPU whose values go to some rows of a new array afterwards.
 
-    The system finds memory for a page when it is first used. A thread uses each page, so that the copy from the device
-    does not wait for them one after another.
+    The system finds memory for a page when it is first used, and clears it. Threads use each page, so that the copy
+    from the device does not wait for them one after another.
     """
-    thread = None
+    users: list[threading.Thread] = []
     if isinstance(flat, np.ndarray) and not isinstance(flat, np.memmap) and not device.is_cpu:
         block = flat[rows]
         if block.flags.c_contiguous and block.nbytes >= LEAST_BYTES:
             one_of_each = block.reshape(-1).view(np.uint8)[:: mmap.PAGESIZE]
-            thread = threading.Thread(target=np.bitwise_or, args=(one_of_each, 0, one_of_each))  # keeps every value
-            thread.start()
+            # half of the processors: the others copy samples
+            for pages in np.array_split(one_of_each, max(1, min(threads() // 2, block.nbytes // PAGES_BYTES))):
+                users.append(threading.Thread(target=np.bitwise_or, args=(pages, 0, pages)))  # keeps every value
+                users[-1].start()
     try:
         yield
     finally:
-        if thread:
-            thread.join()
+        for user in users:
+            user.join()
 
 
 class Bands(Protocol):

@@ -14,6 +14,7 @@ For other folders:
     forecast         forecast of backproject; the speed of a device
     pixel_taper      a taper over the aperture of each pixel
     profile_energy   energy of the range profiles against the energy at the pixels
+    row_norms        norms of the rows with their weights, and a bound of the weighted samples
     strip_map        doppler_centroid(), effective_velocity(): strip maps on an equivalent straight track
     unseen_pixels    pixels outside the range window of every row
     direct/          every (row, pixel) pair that is not skipped, in float32

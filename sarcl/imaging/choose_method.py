@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import TypeAlias, TypeVar
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -30,13 +30,15 @@ from .factorized.factorized import Factorized
 from .factorized.plan import FactorPlan
 from .float64 import direct as float64_direct
 from .float64 import plan as float64_plan
-from .focusing_task import FocusingTask
+from .focusing_task import FocusingTask, per_task
+from .row_norms import row_norms
 from .tiling.of_grid import tiling_of
 from .tiling.tiling import Tiling
 
 METHODS = ("auto", "direct", "factorized")
 ROUNDING = 0.5  # largest share of a tolerance for each error that no plan makes smaller; the plan needs the rest
-MOST_CHOICES = 8  # that are kept for the same echoes
+MOST_CHOICES = 8  # that are kept for the same echoes, and plans for the same geometry
+STEPS = 2**10  # of a tolerance between two powers of 2: of echoes that differ little the plan is the same
 STEP_OF_SEARCH = 2.0  # ratio of the tolerances that are tried for a refusal: plans of sub-apertures take long
 FLOAT64_SHARE = 1e-8  # error of gains in float64, over that in float32: 2^-29 by the digits, and a margin
 GAINS, SUMS = "float32 gains of the antenna", "rounding of float32 sums"
@@ -77,9 +79,12 @@ class MethodChoice:
         return self.engine(device, task, self.plan, self.tiling)
 
 
-_choices: WeakKeyDictionary[PhaseHistory, dict[tuple[object, ...], MethodChoice]] = WeakKeyDictionary()
+Planned: TypeAlias = tuple[ImagePlan, Tiling]
+Planner: TypeAlias = Callable[[FocusingTask, float, DeviceClass], Planned]
 
-Planner: TypeAlias = Callable[[FocusingTask, float, DeviceClass], tuple[ImagePlan, Tiling]]
+_choices: WeakKeyDictionary[PhaseHistory, dict[tuple[object, ...], MethodChoice]] = WeakKeyDictionary()
+kept_plans: dict[tuple[object, ...], Planned] = {}  # of the last geometries, whatever the samples
+Result = TypeVar("Result")
 Candidate: TypeAlias = (
     MethodChoice | ToleranceUnreachable
 )  # a plan, or its refusal: `choose` raises the one that counts
@@ -97,23 +102,29 @@ def choose(
 
     The last choices for the same echoes are kept (`_conditions`).
     """
-    conditions = _conditions(task)
+    conditions = _conditions(task) if is_constant(task.raw.samples) else None
     if conditions is None:
         return _cheapest(task, method, tolerance, devices, float64)
-    known, key = _choices.setdefault(task.raw, {}), (conditions, method, tolerance, devices, float64)
-    chosen = known.pop(key, None) or _cheapest(task, method, tolerance, devices, float64)
-    known[key] = chosen  # the last one
+    key = conditions, method, tolerance, devices, float64
+    return _kept(_choices.setdefault(task.raw, {}), key, lambda: _cheapest(task, method, tolerance, devices, float64))
+
+
+def _kept(known: dict[tuple[object, ...], Result], key: tuple[object, ...], make: Callable[[], Result]) -> Result:
+    """The result of a key, made where it is not known; the last MOST_CHOICES are kept."""
+    result = known.pop(key, None)
+    known[key] = result = make() if result is None else result  # the last one
     for oldest in list(known)[:-MOST_CHOICES]:  # a copy: other threads may choose at the same time
         known.pop(oldest, None)
-    return chosen
+    return result
 
 
+@per_task
 def _conditions(task: FocusingTask) -> str | None:
     """Checksum of all that a choice follows from beside the samples; None where it cannot be kept.
 
-    That is where samples may change, where an option has no checksum, and for listed points, which take memory.
+    That is where an option has no checksum, and for listed points, which take memory.
     """
-    if not task.grid.is_plane or not is_constant(task.raw.samples):
+    if not task.grid.is_plane:
         return None
     raw, fields = task.raw, (getattr(task, name) for name in task.__dataclass_fields__ if name != "raw")
     rows = raw.frequency, raw.frequency_step, raw.time, raw.tx_channel, raw.rx_channel, raw.polarization
@@ -159,7 +170,7 @@ class Float32Methods:
     """
 
     def __init__(self, task: FocusingTask, tolerance: float) -> None:
-        strongest = float(profile_energy.row_norms(task).max()) / np.sqrt(task.raw.n_samples)
+        strongest = float(row_norms(task).max()) / np.sqrt(task.raw.n_samples)
         if 0 < strongest < TINY:
             raise ValueError(
                 f"samples times weights reach {strongest:.1e}; complex64 loses digits below {TINY:.0e}: scale the "
@@ -235,13 +246,28 @@ class Float32Methods:
         """
         while True:
             try:
-                plan, tiling = make_plan(self.task, self.inner, devices)
+                plan, tiling = self._plan(make_plan, devices)
             except ToleranceUnreachable as refusal:
                 return refusal
             near = self.energy.darkness(plan.length)
             if near <= self.near:
                 return self._choice(method, plan, tiling, engine)
             self._divide_tolerance(near)
+
+    def _plan(self, make_plan: Planner, devices: DeviceClass) -> Planned:
+        """The planner's plan for `inner`, rounded down to one of STEPS: it is kept, for other samples of this geometry.
+
+        Planned for `inner` itself where the smaller tolerance cannot be met.
+        """
+        conditions, rounded = _conditions(self.task), _rounded_down(self.inner)
+        if conditions is not None and rounded > 0:
+            key = conditions, make_plan, rounded, devices
+            try:
+                return _kept(kept_plans, key, lambda: make_plan(self.task, rounded, devices))
+            except ToleranceUnreachable:
+                if rounded == self.inner:
+                    raise
+        return make_plan(self.task, self.inner, devices)
 
     def _divide_tolerance(self, near: float) -> None:
         """Set `inner`, what is left of the tolerance for a plan whose errors are `near` times those of its kernels."""
@@ -259,6 +285,12 @@ class Float32Methods:
             terms += (ErrorTerm(COORDINATES, self.coordinates, NEAR_ORIGIN),)
         error = float(np.hypot(sum(errors.values()), self.coordinates))
         return MethodChoice(method, plan, tiling, engine, min(error, self.tolerance), terms, plan.cost)
+
+
+def _rounded_down(tolerance: float) -> float:
+    """The largest tolerance of STEPS between two powers of 2 that is not above `tolerance`."""
+    mantissa, exponent = np.frexp(tolerance)
+    return float(np.ldexp(np.floor(mantissa * 2 * STEPS) / (2 * STEPS), exponent))
 
 
 def _direct(task: FocusingTask, tolerance: float, devices: DeviceClass, float64: bool) -> Candidate:

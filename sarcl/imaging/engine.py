@@ -17,6 +17,7 @@ from ..numerics.interpolation import Interpolator
 from ..opencl.device import Buffer, Device
 from ..opencl.pipeline import Pipeline
 from .focusing_task import FocusingTask
+from .row_norms import largest_sample
 from .tiling.tiling import Tiling
 
 
@@ -133,7 +134,9 @@ class RowProfiles:
         length: int,
         pad: int | None = None,
         dtype: type[np.complexfloating] = np.complex64,
+        largest: float | None = None,
     ) -> None:
+        """largest  `largest_sample` of a task with these rows and others, where it is known."""
         self.device, self.task, self.length, self.dtype = device, task, length, dtype
         self.pad = range_profiles.padding(interpolator) if pad is None else pad
         self.stride = length + 2 * self.pad
@@ -141,8 +144,11 @@ class RowProfiles:
         self.sample_weight = task.sample_weight * correction
         self.pipeline = Pipeline(device)
         self._maker: DeviceProfiles | None = None
+        self._largest: float | None = None
         if device_profiles.possible(device, length, dtype):
             self._maker = DeviceProfiles(device, self.sample_weight, length, self.pad, dtype)
+            largest = largest or largest_sample(task)
+            self._largest = None if largest is None else largest * float(np.abs(correction).max())
 
     @property
     def cost(self) -> float:
@@ -173,7 +179,7 @@ class RowProfiles:
         """Buffer of the profiles (stop - start, stride) of rows start ... stop - 1."""
         along = self.task.row_weight[start:stop]
         samples = self.task.raw.read(start, stop)
-        if self._maker and self._maker.holds(samples, along, self.task.raw.largest_part):
+        if self._maker and self._maker.holds(samples, along, self._largest):
             buffer, weights = self.pipeline.upload(samples), self.pipeline.upload(self._maker.weights(along))
             return self._maker.make(buffer, samples.dtype, weights, stop - start)
         weights = along[:, None] * self.sample_weight

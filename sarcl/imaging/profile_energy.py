@@ -18,14 +18,11 @@ from ..numerics.interpolation import deconvolved
 from ..numerics.pulse_geometry import half_path
 from ..opencl import fft
 from .focusing_task import FocusingTask, per_task
+from .row_norms import row_norms
 
 FAINTEST = 1e-20  # share of the power beside the pixels, taken where every pixel is at an exact null of every row
 ROWS, PIXELS, MOST = 16, 256, 2**18  # rows and pixels in the estimate; samples at most
 FEW = 64  # rows of which all are read, as their errors may add up in phase
-ALL = 2**28  # samples up to which every row is read
-IN_CACHE = 2**16  # samples whose squares are made at a time, so that they stay in a cache
-TERMS32 = 128  # of sums of squares in float32, which are added up in float64
-NORMS32 = 1e-12, 1e15  # norms of rows whose squares float32 holds, less those that do not matter
 TAPS, FINER, TERMS = 12, 4.0, 6  # taps, oversampling and terms of an interpolator with an error of 1e-11
 CHANCE, CHANCE_OF_FEW = 1.25, 1.12  # what noise in many pixels makes of `near`, which is 1
 INNER = 0.5  # share of a kernel's largest error that most kernels keep to in the inner half of the band
@@ -109,51 +106,6 @@ def estimate(task: FocusingTask) -> ProfileEnergy:
     return ProfileEnergy(
         float(np.sqrt(near / max(pixel_power, floor))), float(np.sqrt(total_power / max(pixel_power, floor))), together
     )
-
-
-@per_task
-def row_norms(task: FocusingTask) -> np.ndarray:
-    """Norm of the samples of each row with their weights, (n_rows,) float64.
-
-    Of more than 2^28 samples (2 GiB), only every n-th row is read, and its norm is used up to the next one.
-    """
-    raw = task.raw
-    every = -(-raw.n_rows * raw.n_samples // ALL)
-    weight, out = np.repeat(np.abs(task.sample_weight), 2), np.empty(raw.n_rows)
-    with np.errstate(over="ignore"):
-        weights = weight**2, weight.astype(np.float32)
-    step = max(1, min(64, 2**20 // raw.n_samples)) if every == 1 else 1
-    at_once = max(1, IN_CACHE // raw.n_samples)
-    for start in range(0, raw.n_rows, step * every):
-        samples = np.ascontiguousarray(raw.read(start, min(start + step, raw.n_rows)))
-        norm = np.concatenate([_weighted_norms(samples[at : at + at_once], *weights) for at in range(0, step, at_once)])
-        out[start : start + step * every] = norm if every == 1 else norm[0]
-    return out * task.row_weight
-
-
-def _weighted_norms(samples: np.ndarray, weight: np.ndarray, weight32: np.ndarray) -> np.ndarray:
-    """Norms of rows (n, n_samples), float64; weight (2 n_samples,): on the squares of real and imaginary parts.
-
-    weight32  on the parts themselves, float32
-    """
-    real_and_imaginary = samples.view(samples.real.dtype)
-    n, width = real_and_imaginary.shape
-    if real_and_imaginary.dtype == np.float32 and width >= 8 * TERMS32:  # of fewer terms roundings would be seen
-        padded = np.zeros((n, -(-width // TERMS32) * TERMS32), np.float32)
-        with np.errstate(over="ignore", invalid="ignore"):
-            np.multiply(real_and_imaginary, weight32, out=padded[:, :width])
-            parts = padded.reshape(n, padded.shape[1] // TERMS32, TERMS32)
-            norms = np.sqrt(np.einsum("ijk,ijk->ij", parts, parts).sum(axis=1, dtype=np.float64))
-        if (norms > NORMS32[0]).all() and (norms < NORMS32[1]).all():
-            return np.asarray(norms)
-    largest = max(float(real_and_imaginary.max(initial=0.0)), -float(real_and_imaginary.min(initial=0.0)))
-    parts = real_and_imaginary.astype(np.float64)
-    if 1e-100 < largest < 1e100:
-        largest = 1.0
-    elif largest:  # squares leave the range of float64
-        parts /= largest
-    # einsum, because BLAS starts its threads for a single row
-    return np.asarray(largest * np.sqrt(np.einsum("ij,j->i", np.square(parts, out=parts), weight)))
 
 
 def share(task: FocusingTask) -> float:

@@ -70,7 +70,7 @@ class DeviceProfiles:
     def holds(self, samples: np.ndarray, row_weight: np.ndarray, largest: float | None = None) -> bool:
         """Whether the device can sum samples (n, n_samples), finite, with weights (n,): by their types and sizes.
 
-        largest  modulus of a real or imaginary part, where it is known
+        largest  modulus that no sample times its `sample_weight` exceeds, where one is known
         A bound, several orders of magnitude below what the host can sum: what fails it, the host must do.
         """
         weights = float(np.abs(row_weight).max()), self._largest

@@ -32,7 +32,8 @@ def bound_of_held(
 ) -> float | None:
     """A modulus that no finite sample times its weights exceeds; None where a device may not sum n of them in `dtype`.
 
-    weights  largest of rows and of samples;  largest  modulus of a real or imaginary part, where it is known
+    weights  largest of rows and of samples
+    largest  modulus that no sample times its weight exceeds, the weight of its row apart, where one is known
     The limit is several orders of magnitude below what the host can sum: what exceeds it, the host must do.
     """
     if samples.dtype == np.complex128:
@@ -44,8 +45,9 @@ def bound_of_held(
         return None
     if largest is None:
         parts = np.ascontiguousarray(samples).view(samples.real.dtype)
-        largest = max(float(parts.max()), -float(parts.min()))
-    bound = 1.5 * largest * weights[0] * weights[1]  # no modulus exceeds the largest part by more than sqrt(2)
+        # no modulus exceeds the largest part by more than sqrt(2)
+        largest = 1.5 * weights[1] * max(float(parts.max()), -float(parts.min()))
+    bound = largest * weights[0]
     return bound if bound * n <= LARGEST[dtype] / SPARE else None
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base.threads import copy
 from .device import Device
 
 if TYPE_CHECKING:
@@ -102,12 +103,17 @@ class _Staged:
 
     def __init__(self, device: Device, queue: pyopencl.CommandQueue, nbytes: int) -> None:
         self.device, self.queue, self.nbytes = device, queue, nbytes
-        self.host, self.buffer = device.page_locked(queue, nbytes), device.empty(nbytes)
+        self.buffer, self.host = device.empty(nbytes), device.page_locked(queue, nbytes)
         self._copy: pyopencl.Event | None = None
 
     def copied(self, array: np.ndarray) -> Buffer:
         """The buffer, which is being filled with `array`: what is enqueued on the device from here on waits for it."""
         staged = self.host[: array.nbytes]
-        np.copyto(staged.view(array.dtype).reshape(array.shape), array)
+        copy(array, staged.view(array.dtype).reshape(array.shape))
         self._copy = self.device.write_behind(self.queue, self.buffer, staged)
         return self.buffer
+
+    def __del__(self) -> None:
+        if hasattr(self, "host"):  # else the driver refused the memory
+            self._copy = None  # waits for it
+            self.device.give_back(self.host)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import threading
 
+import numpy as np
 import pytest
 
-from sarcl.base.threads import of_each, threads
+from sarcl.base.threads import copy, of_each, threads
 
 
 def test_results_come_in_the_order_of_the_parts(monkeypatch):
@@ -34,3 +35,14 @@ def test_an_error_in_a_part_is_raised(monkeypatch, allowed):
     monkeypatch.setenv("SARCL_THREADS", allowed)
     with pytest.raises(ZeroDivisionError):
         of_each(lambda part: 1 / part, [1, 0, 2])
+
+
+@pytest.mark.parametrize("shape", [(), (3,), (5, 2**18 + 3), (1, 2**22), (2**22 + 1,)])
+def test_a_copy_has_all_values_whatever_threads_share_it(monkeypatch, shape):
+    monkeypatch.setenv("SARCL_THREADS", "3")
+    source = np.random.default_rng(0).standard_normal(shape)
+    target = np.zeros_like(source)
+    copy(source, target)
+    assert np.array_equal(source, target)
+    copy(source.T, target.T)
+    assert np.array_equal(source, target)

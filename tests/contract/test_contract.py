@@ -11,6 +11,7 @@ from helpers.contract_cases import build, draw
 
 import sarcl
 from sarcl.bench.exact import backproject as quick_sum
+from sarcl.imaging.choose_method import kept_plans
 from sarcl.imaging.direct import direct, line_plan
 from sarcl.numerics import interpolation, interpolator_choice
 from sarcl.opencl.choose_device import open_device
@@ -88,6 +89,7 @@ def test_a_formula_four_times_too_small_breaks_the_contract(monkeypatch):
 def clear_choices():
     interpolator_choice.choose_interpolator.cache_clear()
     interpolator_choice.least_error.cache_clear()
+    kept_plans.clear()
 
 
 def hold_worst(tolerance):

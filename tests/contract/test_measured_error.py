@@ -10,6 +10,7 @@ import pytest
 from helpers.cases import noise_history
 
 import sarcl
+from sarcl.imaging.choose_method import kept_plans
 from sarcl.imaging.direct import line_plan
 from sarcl.numerics import interpolation, interpolator_choice
 from sarcl.reference.backproject import backproject as exact
@@ -54,6 +55,7 @@ def too_small(monkeypatch):
 def clear_choices():
     interpolator_choice.choose_interpolator.cache_clear()
     interpolator_choice.least_error.cache_clear()
+    kept_plans.clear()
 
 
 def test_a_tolerance_that_was_missed_is_an_error_that_keeps_the_image(too_small, tmp_path):

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import ast
 import copy
+import dataclasses
 import functools
+import itertools
 import pickle
 import re
 from pathlib import Path
@@ -242,7 +244,15 @@ def interpolated(verb=sarcl.echo):
     )  # fmt: skip
 
 
-PLANTED = {  # plans of images are kept for the same echoes: raw[:] are others
+MOVES = itertools.count(1)
+
+
+def moved(raw):
+    """The same echoes from other places each time: plans are kept for places."""
+    return dataclasses.replace(raw, tx=raw.tx + 1e-6 * next(MOVES))
+
+
+PLANTED = {
     "interpolated channels": ("sarcl.simulation.channels._interpolated.InterpolatedChannels.fill", interpolated),
     "planning of interpolated channels": ("sarcl.simulation.scene_plan.plan_scene", interpolated),
     "a scene made ready": ("sarcl.simulation.planned_echoes.prepare_scene", interpolated),
@@ -250,21 +260,21 @@ PLANTED = {  # plans of images are kept for the same echoes: raw[:] are others
         "sarcl.simulation.channels._interpolated.InterpolatedChannels.fill",
         lambda: interpolated(functools.partial(sarcl.plan, sarcl.echo)),
     ),
-    "direct": ("sarcl.imaging.direct.direct.make_plan", lambda: sarcl.backproject(RAW[:], PLANE)),
-    "direct, forecast": ("sarcl.imaging.direct.direct.make_plan", lambda: sarcl.plan(RAW[:], PLANE)),
+    "direct": ("sarcl.imaging.direct.direct.make_plan", lambda: sarcl.backproject(moved(RAW), PLANE)),
+    "direct, forecast": ("sarcl.imaging.direct.direct.make_plan", lambda: sarcl.plan(moved(RAW), PLANE)),
     "interpolator": ("sarcl.numerics.interpolator_choice.choose_interpolator", lambda: sarcl.backproject(RAW, LISTED)),
     "interpolator of lines": (
         "sarcl.numerics.interpolator_choice.choose_interpolator",
-        lambda: sarcl.backproject(RAW[:], PLANE),
+        lambda: sarcl.backproject(moved(RAW), PLANE),
     ),
-    "float64": ("sarcl.imaging.float64.plan.make_plan", lambda: sarcl.backproject(RAW[:], PLANE, tolerance=1e-8)),
+    "float64": ("sarcl.imaging.float64.plan.make_plan", lambda: sarcl.backproject(moved(RAW), PLANE, tolerance=1e-8)),
     "sub-apertures": (
         "sarcl.imaging.factorized.plan.make_plan",
-        lambda: sarcl.backproject(SMOOTH[:], LARGE, tolerance=1e-2),
+        lambda: sarcl.backproject(moved(SMOOTH), LARGE, tolerance=1e-2),
     ),
     "sub-apertures, decimation": (
         "sarcl.imaging.factorized.plan.decimated",
-        lambda: sarcl.plan(SMOOTH[:], LARGE, tolerance=1e-2),
+        lambda: sarcl.plan(moved(SMOOTH), LARGE, tolerance=1e-2),
     ),
     "lit parts": (
         "sarcl.visibility.lit_parts.candidate_pairs",

@@ -22,7 +22,7 @@ import numpy as np
 
 from sarcl import ToleranceMissed, ToleranceUnreachable
 from sarcl.opencl import choose_device, fft, native_functions
-from sarcl.opencl.device import Device, Limits
+from sarcl.opencl.device import Device, Limits, PageLocked
 from sarcl.opencl.device_list import DeviceInfo
 from sarcl.opencl.launch_numbers import struct_layout
 from sarcl.opencl.native_functions import sincos_error
@@ -96,7 +96,7 @@ class PaperDevice(Device):
         self.info, self.limits, self.found, self.task, self.until = info, Limits(), found, "", ""
         self._raw = self.context = self.queue = None
         self._kernels: dict[tuple[Any, ...], dict[str, Any]] = {}
-        self._lock = threading.RLock()
+        self._lock, self._page_locked = threading.RLock(), PageLocked(4 * self.limits.upload)
 
     def begin(self, task: str, until: str = "") -> None:
         """Name the task that the programs built from now on are for, and the beginning of the last kernel's name."""
@@ -130,7 +130,7 @@ class PaperDevice(Device):
     def another_queue(self) -> Any:
         return None
 
-    def page_locked(self, queue: Any, nbytes: int) -> np.ndarray:
+    def _lock_pages(self, queue: Any, nbytes: int) -> np.ndarray:
         return np.zeros(nbytes, np.uint8)
 
     def write_behind(self, queue: Any, buffer: Any, values: np.ndarray) -> Any:

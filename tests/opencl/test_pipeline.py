@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
+
 import numpy as np
 import pytest
 from helpers.devices import as_gpu
@@ -74,3 +77,46 @@ def test_after_an_exception_nothing_runs_and_nothing_follows(made, monkeypatch):
         pipeline.new_block()
         pipeline.step(lambda: ended.append(1))
     assert ended == [1]
+
+
+@pytest.mark.parametrize("n", [1, 249, 250, 251, 500, 501, 1234])
+def test_large_arrays_leave_a_gpu_in_pieces_with_the_same_bits(device, n):
+    gpu, values = as_gpu(device, download=1000), np.arange(n, dtype=np.float32)
+    buffer = gpu.copied(values)
+    assert np.array_equal(gpu.download(buffer, np.empty_like(values)), values)
+    assert np.array_equal(
+        gpu.download(buffer, np.empty((1, n // 2), np.float32), offset=4 * (n - n // 2)), values[None, n - n // 2 :]
+    )
+    apart = np.full((n, 1), -1, np.complex64)
+    assert np.array_equal(gpu.download(gpu.copied(values.astype(np.complex64)), apart), values[:, None])
+
+
+def test_page_locked_memory_is_used_again_and_little_of_it_is_kept(device):
+    gpu = as_gpu(device, upload=1000)
+    queue = gpu.another_queue()
+    first, second = gpu.page_locked(queue, 3000), gpu.page_locked(queue, 3000)
+    assert first.size >= 3000 and not np.shares_memory(first, second)
+    gpu.give_back(first)
+    assert gpu.page_locked(queue, 3001) is not first and gpu.page_locked(queue, 1499) is not first
+    assert gpu.page_locked(queue, 1500) is first
+    oldest = weakref.ref(first)
+    gpu.give_back(first)
+    del first
+    gpu.give_back(second)  # 6000 bytes in all
+    assert oldest() is None and gpu.page_locked(queue, 3000) is second
+
+
+def test_a_second_pipeline_uploads_through_the_memory_of_the_first(device):
+    gpu, data, used = as_gpu(device, upload=2000), np.ones((4, 100), np.float32), []
+    queue = gpu.another_queue()
+    for _ in range(3):
+        with Pipeline(gpu) as pipeline:
+            pipeline.new_block()
+            moved(gpu, pipeline.upload(data), 100, gpu.empty(1600))
+            pipeline.step()
+        del pipeline
+        gc.collect()
+        memory = gpu.page_locked(queue, data.nbytes)
+        used.append(memory.ctypes.data)
+        gpu.give_back(memory)
+    assert len(set(used)) == 1

@@ -67,9 +67,18 @@ class Direct(DirectEngine):
     dtype = np.complex64
 
     def __init__(
-        self, device: Device, task: FocusingTask, plan: Plan | LinePlan, tiling: Tiling, gain: bool = False
+        self,
+        device: Device,
+        task: FocusingTask,
+        plan: Plan | LinePlan,
+        tiling: Tiling,
+        gain: bool = False,
+        largest: float | None = None,
     ) -> None:
-        """gain  True: it makes sums of squared gains of the antenna and the rows' weights, instead of an image."""
+        """gain  True: it makes sums of squared gains of the antenna and the rows' weights, instead of an image
+
+        largest  as RowProfiles takes it
+        """
         self.device, self.task, self.plan, self.tiling = device, task, plan, tiling
         self.lanes = device.info.vector_width
         self.taper = TaperOnDevice(device, task, np.float32)
@@ -82,7 +91,7 @@ class Direct(DirectEngine):
             weights=self.antenna.macros if self.antenna else self.taper.macros,
         )
         self.kernels = kernel_of(device, plan, tiling, form)
-        self.profiles = RowProfiles(device, task, plan.interpolator, plan.length)
+        self.profiles = RowProfiles(device, task, plan.interpolator, plan.length, largest=largest)
         # per row, making the range profile costs a tenth of adding it to this many pixels: on a CPU, on a GPU, and on a
         # GPU whose profiles the host makes. For GPUs they are inferred from 2e11 pixels/s: none was measured
         each = 400 if device.is_cpu else 3000 if self.profiles.on_device else 50_000

@@ -23,6 +23,7 @@ from ..direct.direct import Direct
 from ..direct.tile_kernels import Block, KernelForm, Profiles, Pulses, TilesOnDevice, kernel_of
 from ..engine import Engine, RowProfiles, Skipped
 from ..focusing_task import FocusingTask
+from ..row_norms import largest_sample
 from ..tiling.tiling import Roots, Tiling, Tree
 from ._memory import MemoryPlan
 from ._tile_coverage import TileCoverage, coverage_of, same_coverage, without
@@ -119,7 +120,8 @@ class Factorized(Engine):
         root = plan.levels[0]
         sigma = 2 * float(task.raw.frequency_step.min()) * plan.length / SPEED_OF_LIGHT
         pad = root.reach - (0 if task.wrap else int(root.radius * sigma)) + 2 * GUARD
-        self.profiles = RowProfiles(device, self.task, plan.first, plan.length, pad)
+        self.largest = largest_sample(task)
+        self.profiles = RowProfiles(device, self.task, plan.first, plan.length, pad, largest=self.largest)
         self.least = 1000.0 * plan.length
         self.memory = MemoryPlan(
             plan=plan,
@@ -238,7 +240,7 @@ class Factorized(Engine):
             raw, antennas, weight = self.task.raw[rows], self.antennas.picked(rows), self.task.row_weight[rows]
             task = replace(self.task, raw=raw, antennas=antennas, row_weight=weight)
         picked = np.concatenate([np.arange(*tree.leaves_of(root)) for root in roots])
-        engine = Direct(self.device, task, self.plan.edge, self.tiling)
+        engine = Direct(self.device, task, self.plan.edge, self.tiling, largest=self.largest)
         image, missed = engine.add_up(tree.leaves.picked(picked), budget, clock, lambda rows: None)
         move = self.device.kernel("assemble_image.cl", "move")
         numbers, per_tile = self.device.upload(picked.astype(np.int32)), self.tiling.per_tile
