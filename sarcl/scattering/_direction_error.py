@@ -1,7 +1,9 @@
-"""Errors of scattering matrices that are steep in the direction: cosines in float32, and H and V near the vertical.
+"""Errors of scattering matrices: cosines and materials in float32, and H and V near the vertical.
 
 - **Cosines.** S falls with the cosine of incidence, or fades with it (physical_optics.py:lit_share): a direction that
   is rounded by e rad changes S by e/cosine of itself. The rounding of S is measured on sampled facets.
+- **Materials.** Facets have m = 1/sqrt(eps) in float32. Fresnel's coefficients are proportional to 1 - m, which has
+  few digits where eps is close to 1: at 1.001 its rounding is up to 6e-5 of the echo.
 - **Polarisation.** H is horizontal, s x up. It turns about the line of sight s from place to place, by the change of
   the azimuth times the sine of the elevation: by step/(horizontal distance) near the vertical through an antenna, and
   by all angles across it. A plane facet has one S, that of its centroid: the error is what H and V at its corners would
@@ -27,6 +29,7 @@ from .physical_optics import normals_and_areas, scattering_matrix, turned
 
 FACETS, PULSES = 200, 5  # samples
 FLOAT32_DIRECTION = 6e-8  # rad, rms: measured 4e-8 to 7e-8 by tests/scattering/test_facet_errors.py
+FLOAT32_ROOT = 2.0**-25  # largest rounding of m between 1/2 and 1 in float32; of smaller ones less
 STEEP = 0.5  # sine of the angle between line of sight and vertical: above, H turns no faster than directions do
 MOST_PIECES = 4096  # of the sampled facets, cut more finely towards the vertical through an antenna
 SHARP = 0.3  # rad of turn over one piece: beyond, errors do not fall with the square of its size
@@ -69,13 +72,16 @@ class DirectionError:
         triangles, wrong, right = self._triangles[some], 0.0, 0.0
         share = share * areas(triangles) * self._reflectivity[some] ** 2
         normals, places = normals_and_areas(triangles)[0], centroids(triangles)
+        weak = root_rounding(self._permittivity[some]) ** 2
         for ends in looks:
             to_tx, to_rx = (unit(end - places) for end in ends)
             n = np.where(
                 (self._two_sided[some] & turned(normals, to_tx, to_rx, self._forward))[:, None], -normals, normals
             )
             exact = self._matrix(n, to_tx, to_rx, some)
-            right += float(share @ (np.abs(exact) ** 2).sum(axis=1))
+            power = share * (np.abs(exact) ** 2).sum(axis=1)
+            right += float(power.sum())
+            wrong += float(power @ weak)
             for look in (to_tx,) if ends[0] is ends[1] or np.array_equal(*ends) else (to_tx, to_rx):
                 tilted = self._matrix(unit(n + FLOAT32_DIRECTION * look), to_tx, to_rx, some)
                 wrong += float(share @ (np.abs(tilted - exact) ** 2).sum(axis=1))
@@ -125,6 +131,17 @@ class DirectionError:
             halves = bisect(triangles[long], lengths[:, long])
             triangles = np.concatenate([triangles[~long], *halves])
             of = np.concatenate([of[~long], of[long], of[long]])
+
+
+def root_rounding(permittivity: np.ndarray) -> np.ndarray:
+    """Largest relative error of Fresnel's coefficients by the rounding of m = 1/sqrt(eps), complex (n,), to float32.
+
+    0 for conductors and vacuum, whose m is exact.
+    """
+    eps = np.where(np.isinf(permittivity) | (permittivity == 1), 4, permittivity)
+    m = 1 / np.sqrt(eps)
+    rounding = FLOAT32_ROOT * np.minimum(1.0, 2 * np.abs(m)) / np.abs(1 - m)
+    return np.where(eps == permittivity, rounding, 0.0)
 
 
 def steep_pulses(antennas: PulseGeometry, places: np.ndarray, vertical: Sequence[float] | np.ndarray) -> list[int]:

@@ -27,6 +27,7 @@ from ..base.constants import EDGE_ON
 from ..base.vectors import cross, unit
 
 UP = (0.0, 0.0, 1.0)
+WEAK = 0.1  # |eps - 1| below which differences in Fresnel's coefficients lose a digit or more
 
 
 def triangle_mean(b: np.ndarray, c: np.ndarray) -> np.ndarray:
@@ -84,12 +85,18 @@ def fresnel(cosine: np.ndarray, permittivity: np.ndarray) -> tuple[np.ndarray, n
 
     cosine        of the angle of incidence, 0..1;  permittivity  relative, eps_r - j sigma/(omega eps0), inf: conductor
     R_v is that of the magnetic field: R_v = -R_h at normal incidence. The root has Im <= 0: fields decay inside.
+    Where eps is close to 1 differences would lose it to rounding: they are products with the factor eps - 1 there.
     """
     c, eps = np.broadcast_arrays(np.asarray(cosine, float), np.asarray(permittivity, complex))
     conductor, vacuum = np.isinf(eps), eps == 1
     eps = np.where(conductor | vacuum, 2, eps)
     root = np.sqrt(eps - 1 + c * c)
-    sides = ((c - root) / (c + root), (eps * c - root) / (eps * c + root))
+    contrast = eps - 1
+    is_weak = np.abs(contrast) < WEAK
+    of_h, of_v = c + root, eps * c + root
+    difference_h = np.where(is_weak, -contrast / of_h, c - root)
+    difference_v = np.where(is_weak, contrast * ((eps + 1) * c * c - 1) / of_v, eps * c - root)
+    sides = difference_h / of_h, difference_v / of_v
     h, v = (np.where(vacuum, 0, np.where(conductor, limit, r)) for r, limit in zip(sides, (-1, 1), strict=True))
     return h, v
 

@@ -38,6 +38,7 @@ from .spreading import ChannelView
 
 TIMED_SHARE, LEAST_TIMED = 0.02, 4e-3  # of the modelled job, and seconds, of pulses that are timed
 SLOWER = 4.0  # over the modelled seconds: pulses that take longer have built kernels or waited; they are timed again
+MORE = 2  # times as many pulses, at least, are timed then: what a call costs by itself counts once per call of the run
 MOST_PLANS = 64  # channels and receivers whose plans are made: of more, those of the pulses that are timed
 JUDGING = 0.02  # of the modelled job: meshes are judged, and warned of, where that takes no more
 FEW_SHARE, MOST_FEW = 16, 8  # of n pulses, n/16 and at most 8 are timed, of several reflections and of edges
@@ -134,18 +135,24 @@ def _timed_pulses(scene: SceneEchoes, method: Method, shape: tuple[int, ...], wo
     n_pulses, most = shape[0], max(TIMED_SHARE * work.seconds, LEAST_TIMED)
     n = int(np.clip(most / (work.adding / n_pulses), 1, max(1, n_pulses // 8)))
 
-    def timed(first: int) -> tuple[float, Added]:
-        block, begin = np.zeros((n, *shape[1:]), np.complex64), time.perf_counter()
-        added = method.fill(scene, block, first, 0, len(scene) * n)
+    def timed(first: int, number: int) -> tuple[float, Added]:
+        block, begin = np.zeros((number, *shape[1:]), np.complex64), time.perf_counter()
+        added = method.fill(scene, block, first, 0, len(scene) * number)
         return time.perf_counter() - begin, added
 
     for first in ((n_pulses - n) // 2, 0, n_pulses - n):  # elsewhere more may be seen
-        seconds, added = timed(first)
+        seconds, added = timed(first, n)
         if added.counts.contributing:
             break
+    pulse = seconds / n
     if seconds > SLOWER * n * work.adding / n_pulses:
-        seconds = min(seconds, timed(first)[0])
-    return Estimate(added.error_terms, added.plan, seconds / n, added.counts.contributing / n)
+        seconds, more = min(seconds, timed(first, n)[0]), min(max(MORE * n, n_pulses // 8), n_pulses)
+        pulse = seconds / n
+        if more > n and added.counts.contributing:
+            longer = timed(min(first, n_pulses - more), more)[0]
+            pulse = float(np.clip((longer - seconds) / (more - n), 0, pulse))
+            pulse += (seconds - n * pulse) / min(n_pulses, max(n, method.pulses(scene.request.budget)))
+    return Estimate(added.error_terms, added.plan, pulse, added.counts.contributing / n)
 
 
 def _beyond_single(planned: PlannedEchoes) -> float:

@@ -186,3 +186,23 @@ def test_a_scene_that_is_not_prepared_has_the_seconds_of_reflections_and_edges(o
     monkeypatch.setattr(time, "perf_counter", lambda: clock[0])
     one, more = (forecast(UNPREPARED, room, CHIRP, TRACK, tolerance=0.1, **o) for o in ({}, options))
     assert more.seconds - one.seconds == pytest.approx(0.5 * len(TRACK) + 2.0, abs=1.0)
+
+
+def test_what_a_call_costs_whatever_its_pulses_is_forecast_once_per_call(monkeypatch):
+    """Plans of 30 channels took 0.07 s for 1 pulse and for 32: counted per pulse, forecasts were 60 times the run.
+
+    By a clock of contributions, on which a call of 5 s has pulses of 0.5 s each; the run needs one call.
+    """
+    subjects, options = (points(), TONE, passing(32)), {"array": line(5), "channels": "separated", "tolerance": 1e-2}
+    plan = sarcl.echo.planned(*subjects, **options)
+    kind, clock = type(plan.plan_scene(plan.task.request).method), [0.0]
+    fill = kind.fill
+
+    def timed(method, scene, samples, *others):
+        clock[0] += 5.0 + 0.5 * len(samples)
+        return fill(method, scene, samples, *others)
+
+    monkeypatch.setattr(kind, "fill", timed)
+    monkeypatch.setattr(time, "perf_counter", lambda: clock[0])
+    told = forecast(PREPARED, *subjects, **options)
+    assert told.seconds - told.planning == pytest.approx(5.0 + 0.5 * 32, rel=1e-3)
