@@ -6,6 +6,7 @@ z = 0 and heading along +x, then turned and placed.
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from functools import reduce
 from operator import add
@@ -46,13 +47,11 @@ FLAT_BEYOND = 3.0  # m about a pad, over which the ground rises to its own heigh
 def scene(edge: float, seed: int = 0) -> Scene:
     """The whole scene, the ground in cells whose edges are at most `edge`, m; `echo` cuts the objects."""
     random = np.random.default_rng(seed)
-    out = ground(edge, random)
-    out = out + place(aeroplane(), (3.5, -5.5), 122, METAL) + slabs()
-    out = out + on_pad(hangar(), (14.0, 15.0), 1, CONCRETE) + on_pad(tower(), (-9.5, 15.5), -1, CONCRETE)
-    out = out + on_pad(tank(), (-15.5, -10.0), 1, METAL) + on_pad(tank(), (-9.0, -17.0), 179, METAL)
-    for x, y, height in TREES:
-        out = out + tree((x, y, relief(x, y)), height, random)
-    return out
+    parts = [ground(edge, random), place(aeroplane(), (3.5, -5.5), 122, METAL), slabs()]
+    parts += [on_pad(hangar(), (14.0, 15.0), 1, CONCRETE), on_pad(tower(), (-9.5, 15.5), -1, CONCRETE)]
+    parts += [on_pad(tank(), (-15.5, -10.0), 1, METAL), on_pad(tank(), (-9.0, -17.0), 179, METAL)]
+    parts += [tree((x, y, relief(x, y)), height, random) for x, y, height in TREES]
+    return parts[0] + reduce(add, parts[1:])  # the ground, which is large, is copied once
 
 
 TREES = (
@@ -126,12 +125,13 @@ def slabs() -> Scene:
 
 
 def patches(x: np.ndarray, y: np.ndarray, random: np.random.Generator) -> np.ndarray:
-    """Smooth random variation about 0, mostly within +-1, from waves 3 to 30 m long."""
+    """Smooth random variation about 0, mostly within +-1, from waves 3 to 30 m long; float32."""
+    x, y = x.astype(np.float32), y.astype(np.float32)
     total = np.zeros_like(x)
     for _ in range(24):
         k = 2 * np.pi / random.uniform(3, 30)
-        angle, phase = random.uniform(0, 2 * np.pi, 2)
-        total += np.sin(k * (x * np.cos(angle) + y * np.sin(angle)) + phase)
+        angle, phase = random.uniform(0, 2 * np.pi, 2).tolist()
+        total += np.sin(k * math.cos(angle) * x + k * math.sin(angle) * y + phase)
     return total / np.sqrt(24)
 
 

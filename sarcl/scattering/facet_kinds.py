@@ -13,6 +13,8 @@ from ..opencl.device import Device
 from ..scene.material import COHERENT
 from ..scene.scene import Scene
 
+DRAWN = 1000  # facets that tell whether most of a scene differ
+
 
 @dataclass(frozen=True, eq=False)
 class FacetView:
@@ -70,3 +72,16 @@ def kinds(scene: Scene, some: np.ndarray | slice = slice(None)) -> np.ndarray:
             names, index = np.unique(values, return_inverse=True)
             kind = kind * len(names) + index
     return kind
+
+
+def examples(scene: Scene, some: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A facet of each kind among some (k,), as positions in these (n,), and the kind of each, 0 to n - 1 (k,).
+
+    Where most differ, as on ground of varying reflectivity, each counts as a kind: sorting them would take longer.
+    """
+    drawn = some[:: len(some) // DRAWN + 1]
+    if 2 * len(np.unique(kinds(scene, drawn))) > len(drawn):
+        every = np.arange(len(some))
+        return every, every
+    _, first, kind = np.unique(kinds(scene, some), return_index=True, return_inverse=True)
+    return first, kind

@@ -300,7 +300,7 @@ class RoughFacets(FacetSet):
     def tiling_numbers(self, nodes: np.ndarray, metal: bool, dispersive: bool) -> tuple[np.ndarray, np.ndarray]:
         """Arguments `surfaces` and `kinds` of `RoughPieces.placed`."""
         scene, of = self.pieces.scene, self.pieces.of
-        _, example, kinds = np.unique(facet_kinds.kinds(scene, of), return_index=True, return_inverse=True)
+        example, kinds = facet_kinds.examples(scene, of)
         example = of[example]
         alike = FacetSet(
             scene.triangles[example], scene.reflectivity[example], scene.two_sided[example], scene.material[example],

@@ -70,8 +70,8 @@ def surface(
         raise ValueError("no cell has heights at all its corners; nothing would reflect")
     if not has_data.all():
         log.info("left out %d of %d facets: no data", len(has_data) - has_data.sum(), len(has_data))
+        triangles = triangles[has_data]
     displacements = geometry.of_grid(deviation[..., None] * up)[has_data] if deviation.any() else None
-    triangles = triangles[has_data]
     row, column = np.divmod(np.argmax(has_data) // 2, cells[1])
     a, b, c = triangles[0]
     if np.cross(b - a, c - a) @ up[row, column] < 0:  # rows run from north to south: reverse the winding

@@ -58,8 +58,11 @@ def of_grid(points: np.ndarray) -> np.ndarray:
     Counter-clockwise where the second index grows to the right and the first upwards.
     """
     sw, se, nw, ne = points[:-1, :-1], points[:-1, 1:], points[1:, :-1], points[1:, 1:]
-    both = np.stack([np.stack([sw, se, ne], axis=2), np.stack([sw, ne, nw], axis=2)], axis=2)
-    return both.reshape(-1, 3, *points.shape[2:])
+    out = np.empty((*sw.shape[:2], 2, 3, *points.shape[2:]), points.dtype)
+    for number, corners in enumerate(((sw, se, ne), (sw, ne, nw))):
+        for corner, places in enumerate(corners):
+            out[:, :, number, corner] = places
+    return out.reshape(-1, 3, *points.shape[2:])
 
 
 def cut(triangles: np.ndarray, max_edge: float, max_facets: int) -> tuple[np.ndarray, np.ndarray]:

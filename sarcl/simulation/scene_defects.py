@@ -19,13 +19,14 @@ INSIDE = 0.75  # winding number of a closed surface: 1 within it, 0 outside, 1/2
 def warn_of_coincident(scene: Scene) -> None:
     """Warn of facets that lie on one another and are seen from one side: each of them counts."""
     facet = np.flatnonzero(scene.reflectivity > 0)
-    triangles = scene.triangles[facet]
+    triangles = scene.triangles if len(facet) == len(scene.triangles) else scene.triangles[facet]
     if len(triangles) < 2:
         return
     bounds = box(triangles.reshape(-1, 3))
     size = max(float(np.linalg.norm(bounds[1] - bounds[0])), np.finfo(float).tiny)
-    along, across = (((triangles - bounds[0]) / size) @ AXES.T).transpose(2, 0, 1)
-    number = (along + across**2).sum(axis=1)  # the same for any order of the corners
+    corners = (triangles.reshape(-1, 3) - bounds[0]) / size
+    one, two, three = (corners @ AXES[0] + (corners @ AXES[1]) ** 2).reshape(-1, 3).T
+    number = one + two + three  # the same, but for rounding, for any order of the corners
     order = np.argsort(number, kind="stable")
     near = np.flatnonzero(np.diff(number[order]) < 6 * EQUAL)
     one, other = triangles[order[near]], triangles[order[near + 1]]

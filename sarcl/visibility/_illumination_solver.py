@@ -74,12 +74,13 @@ class IlluminationSolver:
             for part in occlusions
             if len(part.occluders) and part.hidden.any()
         ]
-        # facets in parts that share what may hide them
-        kind = sum(hidden * 2**i for i, (_, hidden) in enumerate(hiders)) + np.zeros(k, np.int64)
+        # facets (k,) bool in parts that share what may hide them
+        kind = sum(hidden.astype(np.uint8) << i for i, (_, hidden) in enumerate(hiders)) + np.zeros(k, np.uint8)
         self._parts = [
-            (np.flatnonzero(kind == number), [hider for i, (hider, _) in enumerate(hiders) if number >> i & 1])
-            for number in np.unique(kind).tolist()
+            (kind == number, [hider for i, (hider, _) in enumerate(hiders) if number >> i & 1])
+            for number in np.flatnonzero(np.bincount(kind)).tolist()
         ]
+        self._words: dict[int, object] = {}  # of the samples of CHUNK facets on so many lines
         self._few = SampleLines.of_facets(device, FEWEST_LINES)
         self._more = self._few
 
@@ -124,9 +125,8 @@ class IlluminationSolver:
 
     def _chunks(self, some: np.ndarray | None) -> Iterator[tuple[np.ndarray, list[Occluders]]]:
         """Numbers of the facets to be looked at, of those in `some` (k,) bool alone, with what may hide them."""
-        for index, hiders in self._parts:
-            if some is not None:
-                index = index[some[index]]
+        for part, hiders in self._parts:
+            index = np.flatnonzero(part if some is None else part & some)
             for i in range(0, len(index), CHUNK):
                 yield index[i : i + CHUNK], hiders
 
@@ -145,7 +145,9 @@ class IlluminationSolver:
         if n == 0:
             return np.zeros((0, 2), np.uint16)
         which, seen = device.upload(index.astype(np.int32)), device.empty(4 * n)
-        samples = DeviceSamples(self.facets, which, n, lines, device.empty(4 * lines.count * n))
+        if lines.count not in self._words:  # one for all chunks, which follow one another: its pages are made once
+            self._words[lines.count] = device.empty(4 * lines.count * min(CHUNK, self.facets.size))
+        samples = DeviceSamples(self.facets, which, n, lines, self._words[lines.count])
         face, count = (device.kernel("ray_casting.cl", name, LINES=lines.count) for name in ("face", "seen"))
         for i in of:
             numbers = launch_numbers(

@@ -9,7 +9,7 @@ import numpy as np
 
 from ._facet_samples import FEWEST_LINES
 from ._illumination_solver import IlluminationSolver, Look
-from ._viewpoints import PartialLook, between_levels, refine_viewpoints
+from ._viewpoints import PartialLook, between_levels, is_partly, refine_viewpoints
 
 SAMPLING = 0.375  # of the error of amplitudes: share of counting samples, beside that of looks at some pulses alone
 # Of the square of the accuracy: what both errors may take while those of samples are not known of all pulses, and the
@@ -17,9 +17,6 @@ SAMPLING = 0.375  # of the error of amplitudes: share of counting samples, besid
 MARGIN, LEAST = 0.95, 0.1
 RECENT = 2 * 7 + 2  # levels that are kept where they do not all fit: of the looks between which one lies, and theirs
 ROUNDED = 1 / (12 * 255**2)  # mean square of the rounding of levels to 1/255
-# Of each level: its share, and 1 for a facet that is partly seen
-SQUARES = np.square(np.arange(256) / 255).astype(np.float32)
-IS_PARTLY = (np.arange(256) % 255 != 0).astype(np.float32)
 
 
 @dataclass(eq=False)
@@ -148,13 +145,13 @@ class Judge:
 
     def note(self, look: Look, partial: PartialLook | None) -> None:
         """Note the norm of a look, and its sampling error: of facets that were left out as in the last whole look."""
-        self._whole.append(float(self._power @ SQUARES[look.levels]) + self._beside)
+        self._whole.append(float(self._power @ np.square(look.levels, dtype=np.float32)) / 255**2 + self._beside)
         partly = float(self.weights[look.partly].sum())
         off = look.spread(self.weights) + ROUNDED * partly
         if partial is None or not self._rate:
             self._rate = off / partly if partly else self._rate
         if partial is not None:
-            off += self._rate * max(float(self._power @ IS_PARTLY[look.levels]) - partly, 0.0)
+            off += self._rate * max(float(self._power[is_partly(look.levels)].sum(dtype=np.float64)) - partly, 0.0)
         self._sampling.append(off)
 
     def squares(

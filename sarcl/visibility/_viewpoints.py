@@ -112,8 +112,10 @@ class _Refinement:
             yield middle, halfway, left
             yield b, last, left
             return
-        below = _Selection(moves | (halfway % 255 != 0), ~moves & (halfway % 255 == 0), 0.0)
-        if which.kept is not None:
+        if which.kept is None:
+            moves |= is_partly(halfway)
+            below = _Selection(moves, ~moves, 0.0)
+        else:
             below = self._without_smallest(which.kept, which.settled, some, off)
         yield from self.between(a, first, middle, halfway, below, left)
         yield from self.between(middle, halfway, b, last, below, left)
@@ -155,6 +157,11 @@ def between_levels(first: np.ndarray, last: np.ndarray, part: float) -> np.ndarr
     some = np.flatnonzero(first != last)
     out[some] = np.rint(first[some] + np.float32(part) * (last[some].astype(np.float32) - first[some]))
     return out
+
+
+def is_partly(levels: np.ndarray) -> np.ndarray:
+    """Which levels, uint8 (k,), are those of facets that are neither dark, 0, nor seen whole, 255: bool (k,)."""
+    return np.asarray(levels + np.uint8(1) > 1)
 
 
 def drawn_of(facets: np.ndarray) -> np.ndarray:

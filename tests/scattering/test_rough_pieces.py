@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 import sarcl
 from sarcl.reference import facet_pieces
-from sarcl.scattering import rough_pieces
+from sarcl.scattering import facet_kinds, rough_pieces
 from sarcl.scattering.random_surface import ROUND, cell_edge, pieces_of
 from sarcl.scattering.rough_pieces import RoughFacets, RoughPieces
 from sarcl.scene import triangles as geometry
@@ -276,3 +276,16 @@ def test_smooth_facets_beside_rough_ground_are_cut_as_they_are_alone(tolerance):
     both, alone = (sarcl.echo(scene, chirp, track, **options).report.plan for scene in (ground + box, box))
     for name in ("facet edges, m", "frequencies per facet"):
         assert both[name] == alone[name]
+
+
+@pytest.mark.parametrize(("n_levels", "most"), [(1, 3), (4, 12), (2000, 2000)])
+def test_an_example_stands_for_each_facet_of_its_kind(n_levels, most):
+    random = np.random.default_rng(2)
+    level, index = random.random(n_levels)[random.integers(0, n_levels, 2000)], random.integers(0, 3, 2000)
+    materials = COS, SHARP, SLIGHTLY
+    alike = replace(scene(random.random((2000, 3, 3))), reflectivity=level, materials=materials, material=index)
+    some = np.sort(random.choice(2000, 1500, replace=False))
+    example, kind = facet_kinds.examples(alike, some)
+    chosen = some[example][kind]
+    assert (alike.reflectivity[chosen] == level[some]).all() and (alike.material[chosen] == index[some]).all()
+    assert len(example) <= most and set(kind.tolist()) == set(range(len(example)))
