@@ -175,6 +175,7 @@ ON_CPU = Gathering((TAPS[2], TAPS[4], TAPS[6], TAPS[8]), (RANGE_MODE[0], RANGE_M
 # Spreading of points on a CPU, from seconds of spread_points.cl for 1.6e7 pairs of 5e4 to 1e6 points and 320 to 16
 # pulses, in profiles of 672 to 10752 samples, on 2026-11-27: 3.9 ns with two taps.
 SPREADING = Gathering((1.0, 1.09, 1.39, 1.53), ON_CPU.range_mode, missed=1e-4)
+SPREADING_ON_GPU = ON_CPU._replace(series=SERIES_ON_GPU)  # order 3 takes 142 registers of sm_90 for facets, order 2 128
 ON_GPU = Gathering((1.0, 1.27, 1.6, 2.02), (1.0, 1.36, 3.07, 1.17), 0.088, True, series=SERIES_ON_GPU)
 ON_GPU_IN_PAIRS = Gathering((1.0, 1.27, 1.6, 2.02), (1.0, 3.98, 14.0, 1.17), 0.088, True, series=SERIES_ON_GPU)
 
