@@ -8,7 +8,7 @@
 //   T(m) = s~(m beta/FINE) exp(+j 2 pi kappa m beta/FINE),    W_b(i) = w_b(z_i) exp(+j 2 pi kappa (A_i - (n_i + b) beta/FINE))
 //
 // source    the image equation of sarcl/__init__.py. The part of the curvature that is not in A_i, rest_ij, is that of the pulse in
-//           the middle of GROUP pulses; a pulse whose own differs by more than limit_cycles cycles, whose position differs
+//           the middle of a group of pulses; a pulse whose own differs by more than limit_cycles cycles, whose position differs
 //           by more than limit_position samples or whose step is more than limit_step samples per pixel is added pixel by
 //           pixel instead, as are window edges: the planned error holds for every pulse.
 // symbols   i, j      line, and pixel in the line, about the tile's reference pixel (SIDE/2, SIDE/2); the lines are rows of the
@@ -20,9 +20,8 @@
 //           u, R0, a, w   as in tile_paths.clh
 // macros    VW, FP64, BISTATIC, WRAP, TAPS, TERMS, ORDER, BEAM as in the headers
 //           SIDE      of a tile, a multiple of VW;  FINE samples of T per pixel (1, 2, 4 or 8)
-//           LINE_TAPS even; LINE_TERMS;  GROUP pulses
+//           LINE_TAPS even; LINE_TERMS;  GROUP  most pulses of a group: those that fit into local memory
 //           SLOPE     1: sums of dT/dm too, so that rest_ij moves each pixel's position as well as its phase
-//           LOCAL     1: every tile has profiles of its own, about its reference pixel (factorised); 0: pulses' own
 // reference: sarcl/reference/backproject.py:backproject
 
 #include "common.clh"
@@ -211,12 +210,14 @@ INLINED void add_with_step(__global float *total, __global float *error, size_t 
 
 typedef struct {
     ulong pixels, local_offset;
-    int stride, origin, n, n_used, first, n_tiles;
+    int stride, origin, n, n_used, first, n_tiles, group_size, own_profiles;
     float step_x, step_y, limit_cycles, limit_position, limit_step;
 } backproject_lines_numbers;
 
 // global size (tiles of this block), local size 1. Arguments as of `backproject`; step_x, step_y: m per pixel along j and
 // i; weights: of LINE_TAPS taps; skipped (n_tiles), BEAM: (2, n_tiles)
+//   group_size     pulses of a group, at most GROUP
+//   own_profiles   1: every tile has profiles of its own, about its reference pixel (factorised); 0: pulses' own
 __kernel void backproject_lines(backproject_lines_numbers given, __global const float *restrict profiles,
                                 __global const float *restrict table, __global const float *restrict weights,
                                 __global const float *restrict constants, __global float *restrict image,
@@ -227,12 +228,12 @@ __kernel void backproject_lines(backproject_lines_numbers given, __global const 
     int tile = given.first + get_global_id(0), missed = 0, unlit = 0;
     int n_used = given.n_used, stride = given.stride, origin = given.origin;
     size_t pixels = given.pixels;
-    if (LOCAL) profiles += 2 * (given.local_offset + (size_t)get_global_id(0) * n_used * stride);
+    if (given.own_profiles) profiles += 2 * (given.local_offset + (size_t)get_global_id(0) * n_used * stride);
     profiles += 2 * origin;
     __global const float *records = constants + get_global_id(0) * (size_t)given.n * N_LINE;
-    for (int start = 0; start < n_used; start += GROUP) {
+    for (int start = 0; start < n_used; start += given.group_size) {
         int by_lines[GROUP], by_pixels[GROUP], n_lines = 0, n_pixels = 0, made = 0;  // pulses
-        for (int p = start; p < min(start + GROUP, n_used); p++) {
+        for (int p = start; p < min(start + given.group_size, n_used); p++) {
             int state = as_int(records[(size_t)p * N_LINE + L_STATE]);
             if (state == OUTSIDE) missed++;
             else if (state == UNLIT) unlit++;
@@ -283,7 +284,7 @@ __kernel void backproject_lines(backproject_lines_numbers given, __global const 
                 }
             }
     }
-    if (LOCAL) return;
+    if (given.own_profiles) return;
     skipped[tile] += missed;
     if (BEAM) skipped[given.n_tiles + tile] += unlit;
 }

@@ -18,7 +18,9 @@ import numpy as np
 # Range profiles in float32, in contributions (2026-11-21).
 TAPS = {2: 1.0, 4: 1.5, 6: 1.9, 8: 2.45}  # per contribution, by number of taps
 RANGE_MODE = {0: 1.0, 1: 1.5, 2: 2.2}  # per contribution, by range mode of kernels/range_phase.clh
-SERIES = {2: 1.0, 3: 1.05, 0: 1.33}  # per contribution, by order of the range series; 0: exact root
+SERIES = {3: 1.0, 0: 1.33}  # per contribution, by order of the range series; 0: exact root
+# The same on GPUs. CPUs compute order 3 in the time of order 2 (ratio 1.00 with two taps), so one program serves both.
+SERIES_ON_GPU = ((2, 1.0), (3, 1.05), (0, 1.33))
 TILE = 20.0  # per tile and row: constants that the tile's points share
 
 # Patches from which the images of an interpolation kernel are measured, in contributions (2026-11-22).
@@ -83,7 +85,7 @@ FLOAT64_UNIT = 1.3  # contributions per ns of the next group
 # Backprojection in float64, in ns (2026-11-21).
 FLOAT64_PAIR = 1.15  # per contribution without taps
 FLOAT64_TAP = 0.23  # per contribution and tap
-FLOAT64_SERIES = {2: -0.05, 3: 0.0, 4: 0.1, 0: 0.5, -1: 4.0}  # per contribution, by order; 0: exact, -1: double-double
+FLOAT64_SERIES = {4: 0.1, 0: 0.5, -1: 4.0}  # per contribution, by order; 0: exact, -1: double-double
 FLOAT64_TILE = 38.0  # per tile and row
 FLOAT64_SAMPLE = 10.0  # per sample of a range profile
 
@@ -147,6 +149,7 @@ class Gathering(NamedTuple):
     wavefront   of L1 per 32 contributions, which pass while instructions do; 0: memory is not counted
     fitted      interpolation kernels have as few terms as their taps allow (interpolation.fitted)
     missed      per contribution and sample of a profile beyond CACHED_SAMPLES: they are not in a core's nearest cache
+    series      (order, cost) of the range series that plans choose from
     """
 
     taps: tuple[float, float, float, float]
@@ -154,6 +157,7 @@ class Gathering(NamedTuple):
     wavefront: float = 0.0
     fitted: bool = False
     missed: float = 0.0
+    series: tuple[tuple[int, float], ...] = tuple(SERIES.items())
 
     def of_taps(self, taps: int, oversample: float, length: int = 0) -> float:
         """Cost of so many taps in profiles of `length` samples, so many times finer than 1/bandwidth."""
@@ -171,8 +175,9 @@ ON_CPU = Gathering((TAPS[2], TAPS[4], TAPS[6], TAPS[8]), (RANGE_MODE[0], RANGE_M
 # Spreading of points on a CPU, from seconds of spread_points.cl for 1.6e7 pairs of 5e4 to 1e6 points and 320 to 16
 # pulses, in profiles of 672 to 10752 samples, on 2026-11-27: 3.9 ns with two taps.
 SPREADING = Gathering((1.0, 1.09, 1.39, 1.53), ON_CPU.range_mode, missed=1e-4)
-ON_GPU = Gathering((1.0, 1.27, 1.6, 2.02), (1.0, 1.36, 3.07, 1.17), 0.088, True)
-ON_GPU_IN_PAIRS = Gathering((1.0, 1.27, 1.6, 2.02), (1.0, 3.98, 14.0, 1.17), 0.088, True)
+SPREADING_ON_GPU = ON_CPU._replace(series=SERIES_ON_GPU)  # order 3 takes 142 registers of sm_90 for facets, order 2 128
+ON_GPU = Gathering((1.0, 1.27, 1.6, 2.02), (1.0, 1.36, 3.07, 1.17), 0.088, True, series=SERIES_ON_GPU)
+ON_GPU_IN_PAIRS = Gathering((1.0, 1.27, 1.6, 2.02), (1.0, 3.98, 14.0, 1.17), 0.088, True, series=SERIES_ON_GPU)
 
 
 class DeviceClass(NamedTuple):

@@ -188,14 +188,14 @@ def _ranges(
     error: Callable[[float, int, int], float],
 ) -> Iterator[_Ranges]:
     """Ways to compute ranges in tiles of up to `radius` m; near, gathering  as `cheapest` takes them."""
-    series = cost_model.SERIES
+    series = dict(gathering.series)
     for mode, mode_cost in enumerate(gathering.range_mode):
-        for order in (2, 3, 0) if mode != 2 else (0,):
+        for order in series if mode != 2 else (0,):
             cost = mode_cost - 1 + (series[order] - 1 if mode != 2 else 0.0)
             far = error(radius, mode, order)
             yield _Ranges(mode, order, NO_TILES, far, cost, radius if mode in (0, 3) else 0.0)
             for limit, share in near if mode in (1, 2) else ():
-                for low in (2, 3):
+                for low in filter(None, series):
                     both = share * (series[low] - 1) + (1 - share) * cost
                     small = Near(limit, low, share)
                     yield _Ranges(mode, order, small, max(far, error(limit, 0, low)), both, limit)

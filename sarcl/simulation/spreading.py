@@ -255,7 +255,7 @@ class TiledScatterers:
         distance, highest = antennas.distance(self.tiling.bounds), float(antennas.frequency.max()) + band.bandwidth / 2
         chunk = _chunk(n, tolerance)
         sums = ProfileSums(distance, highest, band.bandwidth, band.n_samples, n, chunk, band.carrier)
-        costs = cost_model.SPREADING if self.device.info.vector_width > 1 else cost_model.ON_CPU
+        costs = cost_model.SPREADING if self.device.info.vector_width > 1 else cost_model.SPREADING_ON_GPU
 
         def with_gain(gain: float) -> Plan:
             limits = {"least_tolerance": least_tolerance, "image_gain": gain}

@@ -11,7 +11,7 @@ from ...numerics.cost_model import DeviceClass
 from ...numerics.interpolation import Interpolator
 from ..focusing_task import FocusingTask
 from ._line_curvature import GroupCurvature, curvatures
-from .line_plan import FINES, MOST_CHOSEN, MOST_FIXED, SAMPLING_MARGIN, LinePlan, profile_interpolator, series
+from .line_plan import FINES, MOST_CHOSEN, MOST_FIXED, SAMPLING_MARGIN, LinePlan, profile_interpolator
 
 SIDES = (64, 32)  # pixels along a side of a tile
 GROUP_SIZES = (64, 32, 16, 8)  # pulses per group
@@ -21,6 +21,7 @@ CHUNK = 64  # pulses added in float32 before the compensated total
 PER_ITEM = 16  # pixels of a work-item
 ENTRY = 24  # numbers that are known of a pulse: N_ENTRY of kernels/line_schedule.clh
 PIXELS = 4  # neighbouring ones among them: PIXELS of the kernel
+SERIES_SHARE = 0.1  # share of a tolerance up to which the range series ends at its second order
 MOST_LOCAL = 48 * 1024  # bytes of local memory that any NVIDIA device gives to a work-group
 
 
@@ -45,13 +46,15 @@ class SharedLinePlan(LinePlan):
         """Fewest work-items with which the kernel works: those that share a line."""
         return self.side // PIXELS
 
-    def macros(self, bistatic: bool, wrap: bool, local: bool = False) -> dict[str, int]:
+    @property
+    def group_room(self) -> int:
+        """Pulses per group that the kernels are built for: those of this plan."""
+        return self.group
+
+    def macros(self, bistatic: bool, wrap: bool) -> dict[str, int]:
         """Build-time macros of kernels/backproject_shared_lines.cl."""
-        if local:
-            raise RuntimeError("lines that a work-group shares read the profiles of pulses; please report this")
         macros = super().macros(bistatic, wrap)
-        for name in ("SLOPE", "LOCAL"):
-            del macros[name]
+        del macros["SLOPE"]
         taps, terms = (self.slopes.taps, self.slopes.terms) if self.slopes else (0, 0)
         macros |= {"SLOPE_TAPS": taps, "SLOPE_TERMS": terms, "ITEMS": self.items, "CHUNK": CHUNK}
         return macros | {"SHARED": 1, "NATIVE": int(self.native)}
@@ -60,6 +63,15 @@ class SharedLinePlan(LinePlan):
     def local_bytes(self) -> int:
         """Bytes of local memory of a work-group."""
         return local_bytes(self.side, self.group, self.fine, self.line.taps, self.slopes.taps if self.slopes else 0)
+
+
+def _series(tolerance: float, curvature: GroupCurvature, highest: float) -> tuple[int, float]:
+    """Order of the range series, and its phase error, rad; highest frequency, Hz."""
+    errors = {
+        order: error_bounds.series_error(curvature.radius, curvature.distance, highest, order) for order in (2, 3)
+    }
+    order = 2 if errors[2] < SERIES_SHARE * tolerance else 3
+    return order, errors[order]
 
 
 def local_bytes(side: int, group: int, fine: int, taps: int, slope_taps: int) -> int:
@@ -94,7 +106,7 @@ def _plans(
 ) -> Iterator[SharedLinePlan]:
     """Plans for one side of tiles and number of pulses per group, whose predicted errors are at most `tolerance`."""
     side, group, n_samples, n_pixels = curvature.side, curvature.group, task.raw.n_samples, task.grid.size
-    order, fixed = series(tolerance, curvature, task.highest)
+    order, fixed = _series(tolerance, curvature, task.highest)
     # sines and cosines: of T; of weights, whose taps are turned by another; and of each turn of a sum
     n_rotations = 3 + CHUNK // group
     fixed += error_bounds.phase_rounding(0.0, task.highest, True) * n_rotations

@@ -23,7 +23,7 @@ GROUP_SIZES = (16, 8, 4)  # pulses per group
 MOST_LINES = 512  # lines of a tile times pulses of a group, at most: their profiles lie in local memory together
 MOST_FIXED = 0.7  # largest share of a tolerance for errors that no interpolator changes
 MOST_CHOSEN = 0.9  # the same with the errors of a line's interpolators; the rest is for that of the range profile
-SERIES_SHARE = 0.1  # share of a tolerance up to which the range series ends at its second order
+ORDER = 3  # of the range series
 SAMPLING_MARGIN = 1.2  # ratio of a line's sampling rate to its bandwidth, at least, so that short interpolators suffice
 SLOPE_ERROR = 8  # ratio of the error of the slopes of weights to that of the weights
 SAMPLED_SIDES, SAMPLED_ENDS = 1.3, 8  # pixels that the samples of a line reach over: so many sides, and so many more
@@ -68,7 +68,15 @@ class LinePlan:
         ranges, series = f"lines, {self.line.taps} taps, {self.fine} samples per pixel", series_words(self.order)
         return plan_words(method, self.interpolator, self.length, self.side**2, ranges, series)
 
-    def macros(self, bistatic: bool, wrap: bool, local: bool = False) -> dict[str, int]:
+    @property
+    def group_room(self) -> int:
+        """Pulses per group that the kernel is built for: the most that fit into local memory, so that plans share
+        programs."""
+        form = self.fine, self.line.taps, self.slope
+        sizes = (n for n in GROUP_SIZES if self.side * n <= MOST_LINES)
+        return max(n for n in sizes if _local_bytes(self.side, n, *form) <= LOCAL_BYTES)
+
+    def macros(self, bistatic: bool, wrap: bool) -> dict[str, int]:
         """Build-time macros of kernels/backproject_lines.cl."""
         return {
             "BISTATIC": int(bistatic),
@@ -78,9 +86,8 @@ class LinePlan:
             "FINE_BITS": self.fine.bit_length() - 1,
             "LINE_TAPS": self.line.taps,
             "LINE_TERMS": self.line.table.shape[-1],
-            "GROUP": self.group,
+            "GROUP": self.group_room,
             "SLOPE": int(self.slope),
-            "LOCAL": int(local),
         }
 
 
@@ -120,7 +127,7 @@ def _cheapest(
     """The cheapest plan for one side of tiles and number of pulses per group whose predicted error is at most
     `tolerance`; `best` where none is cheaper."""
     side, group, n_samples, n_pixels = curvature.side, curvature.group, task.raw.n_samples, task.grid.size
-    order, fixed = series(tolerance, curvature, task.highest)
+    fixed = error_bounds.series_error(curvature.radius, curvature.distance, task.highest, ORDER)
     fixed += error_bounds.phase_rounding(0.0, task.highest, True) * 2
     fixed += error_bounds.position_rounding(curvature.radius, task.bandwidth, False)
     fixed += error_bounds.curvature_rounding(curvature.radius, curvature.distance, task.highest)
@@ -160,7 +167,7 @@ def _cheapest(
             line=line,
             interpolator=interpolator,
             length=length,
-            order=order,
+            order=ORDER,
             slope=slope,
             limits=curvature.limits(task.bandwidth, length / n_samples),
             predicted_error=error + interpolator.error,
@@ -180,15 +187,6 @@ def _cost(side: int, group: int, taps: int, slope: bool, vectors: float) -> floa
     per_tile = cost_model.LINE_SAMPLE * vectors + cost_model.LINE_WEIGHTS * side + cost_model.LINE_PULSE
     per_tap = taps * cost_model.LINE_TAP * (cost_model.LINE_SLOPE if slope else 1)
     return per_tap + per_tile / side**2 + cost_model.LINE_GROUP / group
-
-
-def series(tolerance: float, curvature: GroupCurvature, highest: float) -> tuple[int, float]:
-    """Order of the range series, and its phase error, rad; highest frequency, Hz."""
-    errors = {
-        order: error_bounds.series_error(curvature.radius, curvature.distance, highest, order) for order in (2, 3)
-    }
-    order = 2 if errors[2] < SERIES_SHARE * tolerance else 3
-    return order, errors[order]
 
 
 def profile_interpolator(error: float, n_samples: int, reads: float) -> tuple[Interpolator, int, float] | None:

@@ -137,9 +137,9 @@ class _Lines:
     def __init__(self, device: Device, plan: LinePlan, tiling: LineTiling, form: KernelForm, **records: int) -> None:
         if form.weights["WEIGHT"]:
             raise RuntimeError("lines of pixels share the weights of their pulses; please report this")
-        self.device, self.tiling, self.beam = device, tiling, form.beam
+        self.device, self.tiling, self.beam, self.local = device, tiling, form.beam, form.local
         geometry = {"BISTATIC": int(form.bistatic), "BEAM": int(form.beam)}
-        self.macros = plan.macros(form.bistatic, form.wrap, form.local) | geometry
+        self.macros = plan.macros(form.bistatic, form.wrap) | geometry
         # LOCAL alone: the program of TileConstants, with the same macros
         records |= {"LOCAL": int(form.local), "RANGE": 0}
         self.records = device.kernel("tile_constants.cl", "line_constants", **geometry, **records)
@@ -180,6 +180,7 @@ class LineKernel(_Lines):
         """Add a block of pulses to tiles low ... high - 1 of `image` (4, pixels)."""
         constants = self.constants(on, low, high, block.pulses, self.components)
         numbers = on.numbers(low, block) | {"local_offset": block.profiles.offset, **self.steps, **self.limits}
+        numbers |= {"group_size": self.least_rows, "own_profiles": self.local}
         launch = launch_numbers("backproject_lines.cl", "backproject_lines", **numbers)
         buffers = block.profiles.buffer, self.table, self.weights, constants, image, on.missed
         self.device.run(self.kernel, (high - low,), (1,), launch, *buffers, steps=block.pulses.n_used)

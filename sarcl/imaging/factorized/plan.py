@@ -285,12 +285,12 @@ class _Case:
             return line_plan.choose(self.task, kept, tolerance, source=source, sides=(tiling.side,))
         best = None
         for mode in (0, 1):
-            for order in (2, 3, 0):
+            for order, of_series in cost_model.SERIES.items():
                 error = error_bounds.range_error(
                     tiling.radius, self.distance, self.highest, self.bandwidth, mode, order
                 )
                 error += error_bounds.sum_rounding(CHUNK, raw.n_samples) + source[0].error
-                cost = cost_model.TAPS[source[0].taps] + cost_model.RANGE_MODE[mode] + cost_model.SERIES[order] - 2
+                cost = cost_model.TAPS[source[0].taps] + cost_model.RANGE_MODE[mode] + of_series - 2
                 if error <= tolerance and (best is None or cost < best.cost):
                     best = Plan(*source, tiling.per_tile, mode, order, error, cost)
         return best

@@ -31,7 +31,7 @@ class Float64Plan:
 
     length        samples of a range profile
     per_tile      pixels of a tile
-    order         order of the range series: 2, 3, 4; 0: exact differences; WIDE: exact, in pairs of float64
+    order         order of the range series: 4; 0: exact differences; WIDE: exact, in pairs of float64
     cost          per row, in units of cost_model
     """
 

@@ -303,7 +303,7 @@ class _Case:
         distance = self.antennas.distance(self.cells.bounds)
         summing, best = error_bounds.sum_rounding(most, n_samples), None
         for mode in (0, 1, 2):
-            for order in (2, 3, 0) if mode < 2 else (0,):
+            for order in cost_model.SERIES if mode < 2 else (0,):
                 error = summing + error_bounds.range_error(
                     cells.radius, distance, self.highest, self.band.bandwidth, mode, order
                 )
