@@ -58,8 +58,7 @@ class _Beam:
 def bounce_echo(
     scene: Reflectors,
     frequencies: np.ndarray,
-    tx: np.ndarray,
-    rx: np.ndarray,
+    antennas: tuple[np.ndarray, np.ndarray],
     reference_range: float,
     *,
     bounces: int,
@@ -69,7 +68,8 @@ def bounce_echo(
 ) -> np.ndarray:
     """Echoes of 1, 2 ... `bounces` reflections, m complex128 (bounces, n_f, 2, 2): every sequence of facets.
 
-    tx, rx  m (3,);  reference_range  m;  on_plane  m: corners nearer to a plane lie in it
+    antennas  places of transmitter and receiver, m (3,) each;  reference_range  m
+    on_plane  m: corners nearer to a plane lie in it
     window  least and greatest half path about the reference range, m: places of the last facet beyond it are left out
 
     Flat facets i, j ... l reflect geometrically; the last one, m, radiates by physical optics:
@@ -77,12 +77,13 @@ def bounce_echo(
     over what the beam lights of m and R sees. J: what the reflections do to fields of H and V. Where R = T, HV and
     VH are their mean, by reciprocity: the last facet radiates unlike the others, hence a reversed sequence differs.
     """
+    tx, rx = (np.asarray(place, float) for place in antennas)
     out = np.zeros((bounces, len(frequencies), 2, 2), complex)
-    beams = [_Beam((), (), np.asarray(tx, float), [])]
+    beams = [_Beam((), (), tx, [])]
     for order in range(bounces):
         beams = [beam for old in beams for k in range(len(scene.triangles)) if (beam := _onto(scene, old, k, on_plane))]
         for beam in beams:
-            for triangle in _seen(scene, beam, np.asarray(rx, float), on_plane):
+            for triangle in _seen(scene, beam, rx, on_plane):
                 for part in _within(triangle, beam.image, rx, reference_range, window, max(frequencies)):
                     out[order] += _triangle_echo(scene, beam, part, frequencies, rx, reference_range, up)
     return (out + out.swapaxes(-1, -2)) / 2 if np.array_equal(tx, rx) else out

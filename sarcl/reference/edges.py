@@ -10,7 +10,7 @@ import numpy as np
 
 from ..base.constants import SPEED_OF_LIGHT
 from ..base.vectors import unit
-from ..scattering.physical_optics import UP, polarisation
+from ..scattering.physical_optics import polarisation
 
 BorderFrame: TypeAlias = tuple[np.ndarray, np.ndarray, np.ndarray, float, float]
 # ln of the variable of integration, on whose scale integrands are smooth
@@ -25,7 +25,6 @@ def edge_echo(
     antennas: tuple[np.ndarray, np.ndarray],
     reference_range: float,
     *,
-    up: tuple[float, float, float] = UP,
     seen: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None,
     per_wavelength: float = 20,
     window: tuple[float, float] = (-np.inf, np.inf),
@@ -42,9 +41,9 @@ def edge_echo(
     n = int(np.linalg.norm(way) * per_wavelength * frequencies.max() / SPEED_OF_LIGHT) + 1
     places = ends[0] + (np.arange(n) + 0.5)[:, None] / n * way
     looks = [unit(end - places) for end in (tx, rx)]
-    received = polarisation(-looks[1], up)
+    received = polarisation(-looks[1])
     matrix = np.empty((n, 2, 2), complex)
-    for t, field in enumerate(polarisation(-looks[0], up)):
+    for t, field in enumerate(polarisation(-looks[0])):
         current = fringe(frame, looks[0], looks[1], field)
         for r in range(2):
             matrix[:, r, t] = (received[r] * current).sum(axis=1) / (2 * np.sqrt(np.pi))
@@ -101,7 +100,6 @@ def border_echo(
     antennas: tuple[np.ndarray, np.ndarray],
     reference_range: float,
     *,
-    up: tuple[float, float, float] = UP,
     seen: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None,
     per_wavelength: float = 20,
     window: tuple[float, float] = (-np.inf, np.inf),
@@ -129,7 +127,7 @@ def border_echo(
         ends = zip((one, other), antennas, faces[:2], faces[3:], (g, -g), strict=True)
         for place, antenna, x, number, way in ends:
             look, t = unit(antenna - place), np.cross(x, normal)
-            fields.append([np.cross(-look, e) @ t for e in polarisation(-look, up)])
+            fields.append([np.cross(-look, e) @ t for e in polarisation(-look)])
             phi, end = np.arctan2(look @ normal, look @ x) % (2 * np.pi), np.pi / number
             keller = 2 / number * np.sin(end) / (np.cos(phi / number) - np.cos(end)) * np.cos(phi / 2) ** 2
             detours.append(1 + look @ way)

@@ -172,8 +172,7 @@ def _bounced(scene: BounceScene, view: ChannelView, pulse: int) -> np.ndarray:
     sums = bounce_echo(
         Reflectors(surfaces.corners, surfaces.two_sided, eps, reflectivity, coatings.height),
         view.frequencies,
-        antennas.tx[pulse] - scene.origin,
-        antennas.rx[pulse] - scene.origin,
+        (antennas.tx[pulse] - scene.origin, antennas.rx[pulse] - scene.origin),
         float(antennas.reference_range[pulse]),
         bounces=scene.bounces,
         up=tuple(view.vertical.tolist()),

@@ -37,7 +37,7 @@ TRIHEDRAL = plates(
 def test_two_reflections_of_a_dihedral_have_their_closed_form(angle, expected):
     t = np.radians(angle)
     tx = FAR * np.array([np.cos(t), 0, np.sin(t)])
-    two = bounce_echo(conductors(DIHEDRAL), F, tx, tx, FAR, bounces=2)[1, 0]
+    two = bounce_echo(conductors(DIHEDRAL), F, (tx, tx), FAR, bounces=2)[1, 0]
     assert np.allclose(20 * np.log10(np.abs(np.diag(two))), expected, atol=1e-3)
     assert np.allclose(np.angle(np.diag(two) * [-1, 1]), 0, atol=1e-3)
     assert abs(two[0, 1]) < 1e-6 * abs(two[0, 0])
@@ -47,7 +47,7 @@ def test_two_reflections_of_a_dihedral_have_their_closed_form(angle, expected):
 def test_three_reflections_of_a_trihedral_have_their_closed_form(azimuth, elevation, expected):
     a, e = np.radians([azimuth, elevation])
     tx = FAR * np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
-    three = bounce_echo(conductors(TRIHEDRAL), F, tx, tx, FAR, bounces=3)[2, 0]
+    three = bounce_echo(conductors(TRIHEDRAL), F, (tx, tx), FAR, bounces=3)[2, 0]
     assert np.allclose(20 * np.log10(np.abs(np.diag(three))), expected, atol=2e-3)
 
 
@@ -59,8 +59,8 @@ def test_one_reflection_is_that_of_the_facet_reference():
     f = np.array([1e9, 1.1e9])
     eps = np.full((2, 1), 4 - 0.3j)
     scene = Reflectors(triangle, np.zeros(1, bool), eps, np.ones(1), np.zeros(1))
-    one = bounce_echo(scene, f, tx, rx, 20.0, bounces=1)[0]
-    assert np.allclose(one, facet_echo(triangle, eps, f, tx, rx, 20.0), rtol=1e-8, atol=1e-12)
+    one = bounce_echo(scene, f, (tx, rx), 20.0, bounces=1)[0]
+    assert np.allclose(one, facet_echo(triangle, eps, f, (tx, rx), 20.0), rtol=1e-8, atol=1e-12)
 
 
 def test_what_lies_in_the_way_takes_its_part():
@@ -73,6 +73,6 @@ def test_what_lies_in_the_way_takes_its_part():
     dark = Reflectors(
         np.concatenate([DIHEDRAL, screen]), np.ones(6, bool), np.full((1, 6), np.inf + 0j), reflectivity, np.zeros(6)
     )
-    free = bounce_echo(conductors(DIHEDRAL), F, tx, tx, FAR, bounces=2)[1, 0, 1, 1]
-    blocked = bounce_echo(dark, F, tx, tx, FAR, bounces=2)[1, 0, 1, 1]
+    free = bounce_echo(conductors(DIHEDRAL), F, (tx, tx), FAR, bounces=2)[1, 0, 1, 1]
+    blocked = bounce_echo(dark, F, (tx, tx), FAR, bounces=2)[1, 0, 1, 1]
     assert np.isclose(blocked / free, 0.8, atol=1e-4)

@@ -40,7 +40,7 @@ def exact(
     f = raw.frequency[0] + raw.frequency_step[0] * np.arange(raw.n_samples)
     on_plane = 1e-6 * float(np.linalg.norm(np.ptp(scene.triangles.reshape(-1, 3), axis=0)))
     orders = bounce_echo(
-        reflectors(scene, f), f, raw.tx[0], raw.rx[0], raw.reference_range[0], bounces=3, on_plane=on_plane,
+        reflectors(scene, f), f, (raw.tx[0], raw.rx[0]), raw.reference_range[0], bounces=3, on_plane=on_plane,
         window=window,
     )  # fmt: skip
     spectrum = WAVE.pulse_spectrum(f)
