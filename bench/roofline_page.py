@@ -121,7 +121,7 @@ def section(document: Row, command: str) -> list[str]:
         f"{tops['bytes'] / 1e9:.0f} GB of the first cache, {tops['divisions32'] / 1e9:.1f}e9 divisions in float32, "
         f"{tops['instructions'] / 1e9:.0f}e9 instructions; a launch takes {1e6 / tops['launches']:.0f} CPU us.\n"
         "GPUs: [instructions counted](../developers/gpu_static.md), "
-        "[H100 measured](../developers/benchmarks.md#on-a-gpu)."
+        "[H100 measured](../developers/gpu_benchmarks.md)."
     )
     inside = ", ".join(f"{call} {share:.0%}" for call, share in in_kernels(document).items())
     rest = [f"`{title(row)}` {100 * row['share']:.2g} %" for row in kernels(document) if row["share"] < LEAST_SHARE]

@@ -53,7 +53,7 @@ static inline int2 reached(float ahead, float along_z, int n_vectors) {
 }
 
 // First cell of row (i, j) that is not updated although the wave has reached it, and the first one after these.
-#define HOLE resting[i * n_rows + j]
+#define HOLE ((int2)(resting[i * n_rows + j].x, resting[i * n_rows + j].y))
 // First vector of row (i, j) that the wave has reached, and the first one after these.
 #define LIT (front < INFINITY ? reached(front - along_x * i - along_y * j, along_z, n_vectors) : (int2)(0, n_vectors))
 
@@ -63,7 +63,7 @@ static inline int2 reached(float ahead, float along_z, int n_vectors) {
     int i = given.first + (int)get_global_id(2), any = 0;                                                       \
     int j_end = min(n_rows, ((int)get_global_id(1) + 1) * each);                                                \
     for (int j = (int)get_global_id(1) * each; j < j_end; j++) {                                                \
-        int2 lit = LIT, hole = convert_int2(HOLE) / LANES;                                                      \
+        int2 lit = LIT, hole = HOLE / LANES;                                                                    \
         any |= lit.x < lit.y;                                                                                   \
         for (int v = lit.x, at = start + i * plane + j * row + LANES * v; v < lit.y; v++, at += LANES) {        \
             if (v >= hole.x && v < hole.y) continue;
@@ -80,7 +80,7 @@ static inline int2 reached(float ahead, float along_z, int n_vectors) {
     int v = (int)get_global_id(0), j = (int)get_global_id(1), kept = 0;                                         \
     int i = given.first + (int)get_global_id(2) * each, i_end = j < n_rows ? min(given.last, i + each) : 0;     \
     for (int at = start + i * plane + j * row + v; i < i_end; i++, at += plane) {                               \
-        int2 lit = LIT, hole = convert_int2(HOLE);                                                              \
+        int2 lit = LIT, hole = HOLE;                                                                            \
         int past = kept;                                                                                        \
         kept = v >= lit.x && v < lit.y && (v < hole.x || v >= hole.y);                                          \
         if (!kept) continue;

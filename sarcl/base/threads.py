@@ -38,6 +38,18 @@ def of_each(function: Callable[[Part], Made], parts: Sequence[Part]) -> list[Mad
         return list(pool.map(function, parts))
 
 
+def together(work: Callable[[], Part], beside: Callable[[], Made]) -> tuple[Part, Made]:
+    """The results of two functions, the second by another thread where this process may use several.
+
+    One computes on the host while the other waits for a device. Warnings and reports of progress belong to the first.
+    """
+    if threads() < 2:
+        return work(), beside()
+    with ThreadPoolExecutor(1) as pool:
+        other = pool.submit(beside)
+        return work(), other.result()
+
+
 def copy(source: np.ndarray, target: np.ndarray) -> None:
     """Copy an array into another one of its shape; rows of large ones by several threads."""
     parts = min(source.nbytes // COPIED, len(source)) if source.ndim else 1

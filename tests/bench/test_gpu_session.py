@@ -48,7 +48,7 @@ def test_linear_interpolation_of_critical_samples_has_the_error_of_its_formula(t
 
 def test_the_page_has_every_measured_rate_with_its_error():
     root = Path(gpu_session.__file__).parents[1]
-    page = (root / "docs" / "developers" / "benchmarks.md").read_text()
+    page = (root / "docs" / "developers" / "gpu_benchmarks.md").read_text()
     rows = json.loads((root / "bench" / "results" / "gpu" / "h100.json").read_text())["rows"]
     rates = [row for row in rows if row["stage"] == "rate"]
     assert len(rates) == len(gpu_session.METHODS) * len(gpu_session.TOLERANCES)

@@ -61,7 +61,7 @@ def _first(record: dict[str, Any]) -> list[str]:
         "## Direct backprojection of a plane\n",
         "8192 x 8192 pixels of 0.25 m from 770 km, X band, 600 MHz: per pulse and pixel on sm_90. Instructions are "
         "counted, wavefronts replayed; the ceilings in 10^9 pulses times pixels per second on an H200 are inferred "
-        "from both: an H100 was measured, see benchmarks.md.\n",
+        "from both: an H100 was measured, see gpu_benchmarks.md.\n",
         "Instructions are those of this program for pairs that lie inside of windows, then with both sides of every "
         "branch, then with the records of tiles and pulses, which other programs make.\n",
         "| tolerance | program | instructions | both sides | with records | loads | wavefronts of 32 pairs, range "

@@ -118,7 +118,7 @@ def test_a_kernel_of_many_launches_is_told_the_types_of_its_numbers_and_gives_th
         fields.append(run.download())
     assert sorted(name for name, _ in told) == ["update_e", "update_h"]
     # one struct of numbers, then buffers
-    assert all(types[0] == "void736" and set(types[1:]) == {None} for _, types in told)
+    assert all(types[0] == "void768" and set(types[1:]) == {None} for _, types in told)
     assert np.array_equal(*fields)
 
 

@@ -60,7 +60,7 @@ def test_one_reflection_is_that_of_the_facet_reference():
     eps = np.full((2, 1), 4 - 0.3j)
     scene = Reflectors(triangle, np.zeros(1, bool), eps, np.ones(1), np.zeros(1))
     one = bounce_echo(scene, f, (tx, rx), 20.0, bounces=1)[0]
-    assert np.allclose(one, facet_echo(triangle, eps, f, (tx, rx), 20.0), rtol=1e-8, atol=1e-12)
+    assert np.allclose(one, facet_echo(triangle, eps, f, tx, rx, 20.0), rtol=1e-8, atol=1e-12)
 
 
 def test_what_lies_in_the_way_takes_its_part():
