@@ -57,10 +57,10 @@ def _without_row_weights(task: FocusingTask) -> np.ndarray:
         return _norms(task.raw, task.sample_weight)
     known, key = _kept.setdefault(task.raw, {}), checksum(task.sample_weight)
     norms = known.pop(key, None)
-    known[key] = _norms(task.raw, task.sample_weight) if norms is None else norms  # the last one
+    known[key] = norms = _norms(task.raw, task.sample_weight) if norms is None else norms  # the last one
     for oldest in list(known)[:-MOST_KEPT]:  # a copy: other threads may ask at the same time
         known.pop(oldest, None)
-    return known[key]
+    return norms
 
 
 def _norms(raw: PhaseHistory, sample_weight: np.ndarray) -> np.ndarray:

@@ -56,12 +56,14 @@ class PageLocked:
 
     def __init__(self, most: int) -> None:
         self.most = most
+        self._returned: deque[np.ndarray] = deque()  # without a lock: a collection may give memory back within `take`
         self._unused: list[np.ndarray] = []
         self._lock = threading.Lock()
 
     def take(self, nbytes: int, lock_pages: Callable[[int], np.ndarray]) -> np.ndarray:
         """Memory, uint8, of nbytes or up to twice as many; `lock_pages` gives it where none is unused."""
         with self._lock:
+            self._sort_in()
             fitting = [i for i, memory in enumerate(self._unused) if nbytes <= memory.size <= 2 * nbytes]
             if fitting:
                 return self._unused.pop(min(fitting, key=lambda i: self._unused[i].size))
@@ -69,10 +71,19 @@ class PageLocked:
 
     def give_back(self, memory: np.ndarray) -> None:
         """Memory of `take` that nothing reads or writes any more; the oldest is freed above `most` bytes."""
-        with self._lock:
-            self._unused.append(memory)
-            while sum(unused.size for unused in self._unused) > self.most:
-                self._unused.pop(0)
+        self._returned.append(memory)
+        if self._lock.acquire(blocking=False):
+            try:
+                self._sort_in()
+            finally:
+                self._lock.release()
+
+    def _sort_in(self) -> None:
+        """Have what was given back among what is unused."""
+        while self._returned:
+            self._unused.append(self._returned.popleft())
+        while sum(unused.size for unused in self._unused) > self.most:
+            self._unused.pop(0)
 
 
 def copy_in_pieces(

@@ -233,31 +233,40 @@ class Device:
 
     def download(self, buffer: Any, out: np.ndarray, offset: int = 0) -> np.ndarray:
         """Copy a buffer, from byte `offset` on, into `out` and return it."""
-        enqueued = self._arrays.enqueued
+        with self._lock:  # whatever is counted is enqueued
+            enqueued = self._arrays.enqueued
         with explained(self.info, "a copy", out.nbytes):
             if getattr(buffer, "array", None) is out:  # of `output`: the driver puts the contents where they belong
                 read, byte = self._cl.map_flags.READ, np.dtype(np.uint8)
                 mapped, _ = self._cl.enqueue_map_buffer(self.queue, buffer, read, offset, (out.nbytes,), byte)
                 mapped.base.release()
-            elif not self.is_cpu and out.nbytes > self.limits.download and out.flags.c_contiguous:
-                self._download_in_pieces(buffer, out.reshape(-1).view(np.uint8), offset)
-            else:
+            elif not self._download_in_pieces(buffer, out, offset):
                 self._cl.enqueue_copy(self.queue, out, buffer, src_offset=offset)
         self._ended(enqueued)
         return out
 
-    def _download_in_pieces(self, buffer: Buffer, out: np.ndarray, offset: int) -> None:
-        """`download` to bytes (n,), through page-locked memory."""
-        pieces = [self.page_locked(self.queue, self.limits.download) for _ in range(2)]
+    def _download_in_pieces(self, buffer: Buffer, out: np.ndarray, offset: int) -> bool:
+        """`download` through page-locked memory; False where that does not pay, or the driver gives none."""
+        if self.is_cpu or out.nbytes <= self.limits.download or not out.flags.c_contiguous:
+            return False
+        pieces: list[np.ndarray] = []
+        try:
+            for _ in range(2):
+                pieces.append(self.page_locked(self.queue, self.limits.download))
+        except MemoryError:
+            for memory in pieces:
+                self.give_back(memory)
+            return False
 
         def fill(piece: np.ndarray, first: int) -> pyopencl.Event:
             event = self._cl.enqueue_copy(self.queue, piece, buffer, src_offset=offset + first, is_blocking=False)
             self.queue.flush()
             return event
 
-        copy_in_pieces(fill, [memory[: self.limits.download] for memory in pieces], out)
+        copy_in_pieces(fill, [memory[: self.limits.download] for memory in pieces], out.reshape(-1).view(np.uint8))
         for memory in pieces:
             self.give_back(memory)
+        return True
 
     def run(
         self, kernel: Any, size: tuple[int, ...], group: tuple[int, ...] | None, *args: Any, steps: float = 1
@@ -297,7 +306,8 @@ class Device:
 
     def finish(self) -> None:
         """Wait until everything enqueued is done."""
-        enqueued = self._arrays.enqueued
+        with self._lock:  # whatever is counted is enqueued
+            enqueued = self._arrays.enqueued
         # some drivers allocate buffers when they are used first, and say only here that they do not fit
         with explained(self.info, self._last or "running"):
             self.queue.finish()

@@ -29,7 +29,7 @@ from .physical_optics import normals_and_areas, scattering_matrix, turned
 
 FACETS, PULSES = 200, 5  # samples
 FLOAT32_DIRECTION = 6e-8  # rad, rms: measured 4e-8 to 7e-8 by tests/scattering/test_facet_errors.py
-FLOAT32_ROOT = 2.0**-25  # largest rounding of m between 1/2 and 1 in float32; of smaller ones less
+FLOAT32_ROOT = 2.0**-24  # largest relative rounding of m in float32
 STEEP = 0.5  # sine of the angle between line of sight and vertical: above, H turns no faster than directions do
 MOST_PIECES = 4096  # of the sampled facets, cut more finely towards the vertical through an antenna
 SHARP = 0.3  # rad of turn over one piece: beyond, errors do not fall with the square of its size
@@ -139,8 +139,8 @@ def root_rounding(permittivity: np.ndarray) -> np.ndarray:
     0 for conductors and vacuum, whose m is exact.
     """
     eps = np.where(np.isinf(permittivity) | (permittivity == 1), 4, permittivity)
-    m = 1 / np.sqrt(eps)
-    rounding = FLOAT32_ROOT * np.minimum(1.0, 2 * np.abs(m)) / np.abs(1 - m)
+    root = np.sqrt(eps)  # m/(1 - m) = 1/(root - 1) = (root + 1)/(eps - 1)
+    rounding = FLOAT32_ROOT * np.abs((root + 1) / (eps - 1))
     return np.where(eps == permittivity, rounding, 0.0)
 
 

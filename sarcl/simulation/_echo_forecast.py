@@ -150,7 +150,8 @@ def _timed_pulses(scene: SceneEchoes, method: Method, shape: tuple[int, ...], wo
         pulse = seconds / n
         if more > n and added.counts.contributing:
             longer = timed(min(first, n_pulses - more), more)[0]
-            pulse = float(np.clip((longer - seconds) / (more - n), 0, pulse))
+            least = min(pulse, work.adding / n_pulses)
+            pulse = float(np.clip((longer - seconds) / (more - n), least, pulse))
             pulse += (seconds - n * pulse) / min(n_pulses, max(n, method.pulses(scene.request.budget)))
     return Estimate(added.error_terms, added.plan, pulse, added.counts.contributing / n)
 

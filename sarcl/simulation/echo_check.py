@@ -164,9 +164,8 @@ def _bounced(scene: BounceScene, view: ChannelView, pulse: int) -> np.ndarray:
     from ..reference.bounces import NO_WINDOW, Reflectors, bounce_echo
 
     antennas, surfaces, coatings = view.antennas, scene.surfaces, scene.coatings
-    values, _ = BounceSpreader(scene, view).values(np.array([pulse]), view.frequencies, exact=True)
     if len(scene.mirrors) > MOST_REFLECTORS or view.weights.is_needed or surfaces.ground:
-        return np.asarray(values[0])
+        return np.asarray(BounceSpreader(scene, view).values(np.array([pulse]), view.frequencies, exact=True)[0][0])
     eps = np.stack([coatings.permittivity(f)[coatings.material] for f in view.frequencies.tolist()])
     reflectivity = coatings.reflectivity * surfaces.mirrors
     sums = bounce_echo(

@@ -28,7 +28,7 @@ def test_a_small_limit_is_kept_and_changes_nothing():
     image = "--pulses", "64", "--samples", "256", "--size", "2048", "--max-bytes", "20e6"
     assert run(*image, "--compare")["relative_difference"] <= 1e-6  # it leaves its kernels in the driver's cache, too
     # the allocator keeps some MB of freed pages or not, from run to run
-    assert min(run(*image)["peak_gib"] for _ in range(3)) <= 20e6 / 2**30 + OF_FILES
+    assert sorted(run(*image)["peak_gib"] for _ in range(5))[2] <= 20e6 / 2**30 + OF_FILES
 
 
 @pytest.mark.slow

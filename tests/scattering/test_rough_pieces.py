@@ -278,7 +278,7 @@ def test_smooth_facets_beside_rough_ground_are_cut_as_they_are_alone(tolerance):
         assert both[name] == alone[name]
 
 
-@pytest.mark.parametrize(("n_levels", "most"), [(1, 3), (4, 12), (2000, 2000)])
+@pytest.mark.parametrize(("n_levels", "most"), [(1, 3), (4, 12), (2000, 1500)])
 def test_an_example_stands_for_each_facet_of_its_kind(n_levels, most):
     random = np.random.default_rng(2)
     level, index = random.random(n_levels)[random.integers(0, n_levels, 2000)], random.integers(0, 3, 2000)
@@ -288,4 +288,4 @@ def test_an_example_stands_for_each_facet_of_its_kind(n_levels, most):
     example, kind = facet_kinds.examples(alike, some)
     chosen = some[example][kind]
     assert (alike.reflectivity[chosen] == level[some]).all() and (alike.material[chosen] == index[some]).all()
-    assert len(example) <= most and set(kind.tolist()) == set(range(len(example)))
+    assert len(example) == most and set(kind.tolist()) == set(range(len(example)))

@@ -189,7 +189,7 @@ def test_a_scene_that_is_not_prepared_has_the_seconds_of_reflections_and_edges(o
 
 
 def test_what_a_call_costs_whatever_its_pulses_is_forecast_once_per_call(monkeypatch):
-    """Plans of 30 channels took 0.07 s for 1 pulse and for 32: counted per pulse, forecasts were 60 times the run.
+    """Plans of 30 channels took 0.07 s for 1 pulse and for 32: counted per pulse, forecasts were 19 times the run.
 
     By a clock of contributions, on which a call of 5 s has pulses of 0.5 s each; the run needs one call.
     """

@@ -256,8 +256,10 @@ class BounceSpreader:
         return Facets(np.concatenate(parts), beams[of], rx[beams.pulse[of]], of)
 
     def _inside(self, facets: Facets, pulses: np.ndarray) -> Facets:
-        """The triangles inside the range window, and the parts inside of those on which it ends: there along lines of
-        constant half path, which is linear over a triangle as its phase is."""
+        """The triangles inside the range window, and the parts inside it of those that its edges cross.
+
+        These are cut along lines of constant half path, which is taken as linear over a triangle, as its phase is.
+        """
         if not self.view.gated:
             return facets
         antennas, row = self.view.antennas, pulses[facets.beams.pulse]
@@ -267,17 +269,17 @@ class BounceSpreader:
         at_edge = np.flatnonzero((least > -reach) & (least < reach))
         is_inside = least >= 0
         is_inside[at_edge] = False
-        whole = np.flatnonzero(is_inside)
+        rows_inside = np.flatnonzero(is_inside)
         if not len(at_edge):
-            return facets.chosen(whole)
+            return facets.chosen(rows_inside)
         parts = Polygons.of(facets.triangles[at_edge])
-        for sign, left in ((-0.5, from_near), (0.5, to_far)):
+        for sign, distance in ((-0.5, from_near), (0.5, to_far)):
             rise = np.einsum("nij,nj->ni", parts.corners - facets.center[at_edge, None], sign * facets.both[at_edge])
-            parts = parts.clipped(left[at_edge, None] + rise)
+            parts = parts.clipped(distance[at_edge, None] + rise)
         triangles, part = parts.triangles
-        rows = np.concatenate([whole, at_edge[part]])
-        order = np.argsort(rows, kind="stable")  # beams in rising order
-        corners = np.concatenate([facets.triangles[whole], triangles])[order]
+        rows = np.concatenate([rows_inside, at_edge[part]])
+        order = np.argsort(rows, kind="stable")  # triangles in the order in which they came
+        corners = np.concatenate([facets.triangles[rows_inside], triangles])[order]
         rows = rows[order]
         return Facets(corners, facets.beams[rows], facets.rx[rows], facets.of[rows])
 
