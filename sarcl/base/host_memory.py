@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     import numpy as np
 
 LEAST_RELEASED = 2**23  # bytes of blocks: small images, of 0.1 s, do not pay for a release, of 1 ms or more
+LEAST_WRITTEN = 2**20  # bytes of blocks that are written to files, which takes longer than a release
 
 
 def installed() -> float:
@@ -24,13 +25,13 @@ def installed() -> float:
         return float("inf")
 
 
-def release(nbytes: float) -> None:
+def release(nbytes: float, least: float = LEAST_RELEASED) -> None:
     """Give memory that was freed back to the system, where the C library keeps it (glibc): blocks of another size would
     come on top of it, up to two thirds as much again.
 
-    nbytes  bytes of the blocks that are computed now; below LEAST_RELEASED nothing happens
+    nbytes  bytes of the blocks that are computed now; below `least` nothing happens
     """
-    if nbytes >= LEAST_RELEASED and os.name == "posix":
+    if nbytes >= least and os.name == "posix":
         trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
         if trim is not None:
             trim(0)

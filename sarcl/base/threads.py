@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextvars import copy_context
 from typing import TYPE_CHECKING, TypeVar
 
 if TYPE_CHECKING:
@@ -37,19 +36,6 @@ def of_each(function: Callable[[Part], Made], parts: Sequence[Part]) -> list[Mad
         return [function(part) for part in parts]
     with ThreadPoolExecutor(workers) as pool:
         return list(pool.map(function, parts))
-
-
-def together(work: Callable[[], Part], beside: Callable[[], Made]) -> tuple[Part, Made]:
-    """The results of two functions, the second by another thread where this process may use several.
-
-    One computes on the host while the other waits for a device. Warnings and reports of progress belong to the first,
-    whose error is raised once the second has ended, too.
-    """
-    if threads() < 2:
-        return work(), beside()
-    with ThreadPoolExecutor(1) as pool:
-        other = pool.submit(copy_context().run, beside)
-        return work(), other.result()
 
 
 def copy(source: np.ndarray, target: np.ndarray) -> None:

@@ -177,10 +177,10 @@ class Device:
         with explained(self.info, "a buffer", nbytes):
             return self._cl.Buffer(self.context, self._cl.mem_flags.READ_WRITE, nbytes)
 
-    def release(self, nbytes: float) -> None:
+    def release(self, nbytes: float, least: float = host_memory.LEAST_RELEASED) -> None:
         """Before blocks of so many bytes: on CPUs, what was freed goes back to the system (host_memory.release)."""
         if self.is_cpu:
-            host_memory.release(nbytes)
+            host_memory.release(nbytes, least)
 
     def write(self, buffer: Any, values: np.ndarray) -> None:
         """Copy `values` into a buffer, from its beginning on."""

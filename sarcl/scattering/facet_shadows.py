@@ -61,12 +61,7 @@ class ShadowRule:
 
 
 def lit_parts_of(
-    pieces: Pieces,
-    wanted: np.ndarray,
-    antennas: PulseGeometry,
-    rule: ShadowRule,
-    device: Device,
-    progress: Progress | None,
+    pieces: Pieces, wanted: np.ndarray, antennas: PulseGeometry, rule: ShadowRule, device: Device, progress: Progress
 ) -> LitParts:
     """Lit parts of the pieces `wanted` (k,), which the facets that they are parts of occlude."""
     scene, given = pieces.scene, pieces.original.triangles

@@ -11,7 +11,6 @@ import numpy as np
 from ..base import boxes
 from ..base.constants import EDGE_ON
 from ..base.errors import warn
-from ..base.threads import together
 from ..numerics.pulse_geometry import PulseGeometry
 from ..opencl.device import Device
 from ..scene import triangles as geometry
@@ -86,15 +85,9 @@ def facets_of(
         warn_of_reach(original.triangles)
         report_shadows = partial(progress, "shadows")
         sampled = None if host is None else (host.pieces, host.is_sampled)
-        sample = partial(illumination_of, original, rough, sampled, antennas, shadows, device, report_shadows)
-        if host is None or not host.is_clipped.any():
-            illumination = sample()
-        else:
-            clip = partial(lit_parts_of, host.pieces, host.is_clipped, antennas, shadows, device)
-            if rough is None and not host.is_sampled.any():
-                lit_parts = clip(report_shadows)
-            else:
-                illumination, lit_parts = together(sample, partial(clip, None))
+        illumination = illumination_of(original, rough, sampled, antennas, shadows, device, report_shadows)
+        if host is not None and host.is_clipped.any():
+            lit_parts = lit_parts_of(host.pieces, host.is_clipped, antennas, shadows, device, report_shadows)
     sets: list[FacetSet] = [] if rough is None else list(_seen_rough(rough, illumination, culling))
     if host is not None:
         sets.append(host.seen(illumination, 0 if rough is None else len(rough), lit_parts, culling))

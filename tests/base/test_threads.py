@@ -7,7 +7,7 @@ import threading
 import numpy as np
 import pytest
 
-from sarcl.base.threads import copy, of_each, threads, together
+from sarcl.base.threads import copy, of_each, threads
 
 
 def test_results_come_in_the_order_of_the_parts(monkeypatch):
@@ -35,21 +35,6 @@ def test_an_error_in_a_part_is_raised(monkeypatch, allowed):
     monkeypatch.setenv("SARCL_THREADS", allowed)
     with pytest.raises(ZeroDivisionError):
         of_each(lambda part: 1 / part, [1, 0, 2])
-
-
-@pytest.mark.parametrize("allowed", ["1", "2"])
-def test_two_functions_run_together_the_first_by_the_caller(monkeypatch, allowed):
-    monkeypatch.setenv("SARCL_THREADS", allowed)
-    meeting = threading.Barrier(int(allowed), timeout=20)  # passes where both run at the same time
-
-    def work():
-        meeting.wait()
-        return threading.get_ident()
-
-    here, beside = together(work, work)
-    assert here == threading.get_ident() and (beside == here) == (allowed == "1")
-    with pytest.raises(ZeroDivisionError):
-        together(lambda: 1, lambda: 1 / 0)
 
 
 @pytest.mark.parametrize("shape", [(), (3,), (5, 2**18 + 3), (1, 2**22), (2**22 + 1,)])

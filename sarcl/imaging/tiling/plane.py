@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 
-from ...base import float_pairs
+from ...base import float_pairs, host_memory
 from ...blocks.bands import FlatArray, Run
 from ...model.image_grid import ImageGrid
 from ...numerics.tiles import Tiles
@@ -125,7 +125,7 @@ class PlaneTiling(Tiling):
             if flat.shape[1] == columns:
                 out = flat[rows]
         if out is None:
-            device.release(sums.size)
+            device.release(sums.size, host_memory.LEAST_WRITTEN)
         values = np.empty((height, columns), np.complex64) if out is None else out
         image, slots = device.output(values), device.upload(tile_of_slot)
         numbers = {"pixels": n_tiles * self.per_tile, "across": self.across, "high": self.high, "wide": self.wide}
