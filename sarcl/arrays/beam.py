@@ -203,7 +203,7 @@ class _Field:
         planes = self.device.download(out, np.empty((tiles * n_rows, 2, lane[1]), self.real))
         return np.asarray(planes[:rows, 0] + 1j * planes[:rows, 1])
 
-    def _kernel(self, name: str, used: int = ROWS) -> Any:
+    def _kernel(self, name: str, used: int = ROWS) -> object:
         macros = {"DOUBLE": int(self.plan.double), "ROWS": ROWS, "USED": used, "LANES": self.lane_width}
         fp64 = int(self.device.info.fp64)  # where it is slow too: `_wide` gives it as the plan counts its rounding
         return self.device.kernel("beam.cl", name, **macros, FLUSH=FLUSH, CHUNK=CHUNK, FP64=fp64)

@@ -8,7 +8,10 @@ from __future__ import annotations
 import os
 import sys
 import time
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, NoReturn, TextIO
+
+if TYPE_CHECKING:
+    from tqdm import tqdm
 
 DELAY = 1.0  # s; a shorter stage draws nothing, and tqdm is not imported for it
 FORMAT = "{desc} {percentage:3.0f}% |{bar:24}| {rate_fmt}, {remaining} left"
@@ -31,7 +34,7 @@ class Bar:
         self._stream = stream
         self._stage: str | None = None
         self._start = 0.0
-        self._line: Any = None
+        self._line: tqdm[NoReturn] | None = None
 
     def __enter__(self) -> Bar:
         return self
@@ -59,7 +62,7 @@ class Bar:
             self._line = None
 
 
-def _line(stage: str, done: int, total: int, stream: TextIO | None) -> Any:
+def _line(stage: str, done: int, total: int, stream: TextIO | None) -> tqdm[NoReturn]:
     from tqdm.auto import tqdm
 
     stream = sys.stderr if stream is None else stream

@@ -110,6 +110,6 @@ class Job:
             frame = frame.f_back
         raise KeyboardInterrupt(number)
 
-    def _unraisable(self, unraisable: Any) -> None:
+    def _unraisable(self, unraisable: sys.UnraisableHookArgs) -> None:
         if not isinstance(unraisable.exc_value, KeyboardInterrupt):
             self._hook(unraisable)

@@ -17,6 +17,7 @@ from ..io import formats
 from ._flags import DEFAULTS, METHODS
 
 if TYPE_CHECKING:
+    from ..base.forecast import Forecast
     from ..model.image import Image
     from ..model.image_grid import ImageGrid
     from ..model.phase_history import PhaseHistory
@@ -68,10 +69,12 @@ class Method:
             options["method"] = args.method
         return cls(name, options)
 
-    def plan(self, raw: PhaseHistory, grid: ImageGrid | None, device: object) -> Any:
-        """The Forecast."""
-        on = {"device": device} if "device" in described(getattr(verbs, self.name).options) else {}
-        return verbs.plan(getattr(verbs, self.name), *self._subjects(raw, grid), **self.options, **on)
+    def plan(self, raw: PhaseHistory, grid: ImageGrid | None, device: object) -> Forecast[Image]:
+        """Of the image."""
+        verb = getattr(verbs, self.name)
+        on = {"device": device} if "device" in described(verb.options) else {}
+        forecast: Forecast[Image] = verbs.plan(verb, *self._subjects(raw, grid), **self.options, **on)
+        return forecast
 
     def image(self, raw: PhaseHistory, grid: ImageGrid | None, device: object, **running: object) -> Image | None:
         """The image; None for a piece. running: `out`, `progress`, and `tile` and `resume` of backproject."""

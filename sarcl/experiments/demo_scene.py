@@ -36,9 +36,11 @@ FACING = 0.99  # cosine between the normals of walls that reflect to slabs, and 
 # Flat ground about objects: middle of the foot of the wall that faces the radar, width, and lengths behind that wall
 # and before it, m. The part before it is a slab, onto which the wall reflects, and back
 PADS = (
-    (14.0, 19.0, 12.6, 9.0, 5.9), (-9.5, 16.6, 2.8, 3.0, 8.0),
-    (-15.5, -8.25, 7.4, 4.5, 1.9), (-9.0, -15.25, 7.4, 4.5, 1.9),
-)  # fmt: skip
+    (14.0, 19.0, 12.6, 9.0, 5.9),
+    (-9.5, 16.6, 2.8, 3.0, 8.0),
+    (-15.5, -8.25, 7.4, 4.5, 1.9),
+    (-9.0, -15.25, 7.4, 4.5, 1.9),
+)
 SLAB_HEIGHT = 0.03  # m, above the ground
 UNDER = 0.12  # m, by which a slab reaches under its wall, which is turned by a degree
 FLAT_BEYOND = 3.0  # m about a pad, over which the ground rises to its own height

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from ..opencl.device import Device
+from ..opencl.device import Buffer, Device
 from ..opencl.group_sizes import first_allowed
 from ..opencl.launch_numbers import launch_numbers
 from ..opencl.memory_budget import budget
@@ -120,7 +119,7 @@ def _tables(paths: Paths, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarra
 
 
 def _sums(
-    device: Device, kernel: Any, offset: np.ndarray, values: np.ndarray, tables: list[Any], travel: np.ndarray,
+    device: Device, kernel: object, offset: np.ndarray, values: np.ndarray, tables: list[Buffer], travel: np.ndarray,
     shape: tuple[int, int], group: int,
 ) -> np.ndarray:  # fmt: skip
     """Sums over one list of cells: complex128 (F, pulses); group: the macro GROUP of the kernel."""

@@ -8,7 +8,7 @@ from math import ceil, log
 
 import numpy as np
 
-from ..opencl.device import Device
+from ..opencl.device import Buffer, Device
 from . import dispersion
 from ._lists import SAMPLES, TargetList
 from .fields import BLOCK, PERIODS, Fields
@@ -223,7 +223,7 @@ def _turns(lattice: Lattice, omega: np.ndarray, steps: np.ndarray) -> np.ndarray
     return np.stack([turns.real, turns.imag], axis=-1).astype(np.float32)
 
 
-def _phasors(device: Device, part: TargetList, sums: object, spectrum: np.ndarray) -> np.ndarray:
+def _phasors(device: Device, part: TargetList, sums: Buffer, spectrum: np.ndarray) -> np.ndarray:
     out = np.empty((len(spectrum), len(part.places)), np.complex64)
     both = np.empty((2, part.count), np.float32)
     for f, weight in enumerate(spectrum):

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..opencl.device import Device
+from ..opencl.device import Buffer, Device
 from ..opencl.launch_numbers import launch_numbers
 from ._lists import SAMPLES, CoupledList, IncidentList, TargetList, heard
 from .absorber import layers
@@ -197,7 +197,9 @@ class Fields:
                 )
                 self.device.run(self._edges, size, None, numbers, self.e, *part.arrays)
 
-    def transform(self, part: TargetList, phase: Any, sums: Any, n_samples: int, n_frequencies: int) -> np.ndarray:
+    def transform(
+        self, part: TargetList, phase: Buffer, sums: Buffer, n_samples: int, n_frequencies: int
+    ) -> np.ndarray:
         """Add the samples of the residuals to their sums over time (kernels/fdtd_lists.cl).
 
         Returns the sums over the list of |change|^2 and of |sum|^2, float64 (2, n_frequencies).

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -81,7 +80,7 @@ class PointEchoes:
         leveled = self.plan.factorized_spreader(self.device, points, view, nodes, (0,), self._budget)
         if self.plan.direct is not None:
             numbers = slice(None) if self.plan.numbers is None else self.plan.numbers
-            tiling: Any = self.plan.direct[0].tiling
+            tiling = self.plan.direct[0].tiling
             assert isinstance(tiling, HostTiling)
             tiling.refill(partial(_planes, seen[numbers]))
             direct = self.plan.direct_spreader(view, nodes, self._inner, self._budget)

@@ -26,7 +26,7 @@ class OnHost:
     def __init__(self, device: Device, length: tuple[int, int], flat: list[np.ndarray]) -> None:
         """flat  factors of the rows and of the columns of the image, one over the kernel's transform"""
         self.device, self.length, self.flat = device, length, [f.astype(np.float32) for f in flat]
-        self._half: Any = None  # columns of the image, rows of the grid
+        self._half: np.ndarray | None = None  # columns of the image, rows of the grid
 
     def across(self, tile: int) -> float:
         """Bytes on the device for a row of tiles of the grid."""

@@ -121,7 +121,7 @@ class PulseGeometry:
         inside = (shortest - self.reference_range >= self.near) & (longest - self.reference_range <= self.far)
         return bool(inside.all())
 
-    def beam_depth(self, points: np.ndarray, rows: Any = slice(None)) -> np.ndarray:
+    def beam_depth(self, points: np.ndarray, rows: slice | int | np.ndarray = slice(None)) -> np.ndarray:
         """Distance of points, m (3,) or (n, 3), from the surface of the beams of pulses `rows`; negative outside.
 
         Behind the transmitter it is the distance from the cone's tip.

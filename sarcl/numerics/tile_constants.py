@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from ..base import float_pairs
-from ..opencl.device import Device
+from ..opencl.device import Buffer, Device
 from ..opencl.launch_numbers import launch_numbers
 from .plan import Plan
 
@@ -36,7 +34,7 @@ class TileConstants:
         tiles: tuple[int, int],
         n_tiles: int,
         skip: int = 0,
-    ) -> Any:
+    ) -> Buffer:
         """Records (end - first, n, components) float32, on the device, of the tiles (first, end) and `n` pulses.
 
         n                           a multiple of the device's lanes

@@ -66,7 +66,7 @@ class WeightedSamples:
         self._across = device.copied(float_pairs.wide(sample_weight))
         self._energies = device.kernel("weighted_samples.cl", "energies", FROM64=0)
         self._n_rows, self._scales = n_rows, np.zeros(n_rows)
-        self._sums: Any = None
+        self._sums: Buffer | None = None
 
     def bound(self, samples: np.ndarray, row_weight: np.ndarray) -> float | None:
         """A modulus that no weighted sample of rows (n, n_samples) with weights (n,) exceeds; None: the host's rows.

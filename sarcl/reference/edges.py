@@ -69,9 +69,7 @@ def fringe(
     magnetic = np.cross(-to_tx, field)
     angle = np.arctan2(to_tx @ normal, to_tx @ inward) % (2 * np.pi)
     out = np.zeros((len(to_tx), 3), complex)
-    for x, out_of, phi in (
-        (inward, normal, angle), (other, np.sin(end) * inward - np.cos(end) * normal, end - angle)
-    ):  # fmt: skip
+    for x, out_of, phi in ((inward, normal, angle), (other, np.sin(end) * inward - np.cos(end) * normal, end - angle)):
         t = np.cross(x, out_of)
         cosine = -to_tx @ t
         sine = np.sqrt(1 - cosine**2)

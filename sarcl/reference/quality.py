@@ -6,9 +6,12 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 
-def measure(value: Callable[[np.ndarray], np.ndarray], near: Any, axes: Any, cells: Any) -> dict[str, Any]:
+def measure(
+    value: Callable[[np.ndarray], np.ndarray], near: ArrayLike, axes: np.ndarray, cells: np.ndarray
+) -> dict[str, Any]:
     """Position, irw, pslr, islr and peak of an exact image, pairs in the order of `axes`.
 
     value  complex image (n,) at any positions, m (n, 3)

@@ -67,9 +67,13 @@ class EdgeScatterers(NamedTuple):
 
 
 def beam_edge(
-    scatterers: EdgeScatterers, side: int, places: np.ndarray, weight: Callable[[np.ndarray], np.ndarray],
-    wavenumber: float, middle_range: float,
-) -> np.ndarray:  # fmt: skip
+    scatterers: EdgeScatterers,
+    side: int,
+    places: np.ndarray,
+    weight: Callable[[np.ndarray], np.ndarray],
+    wavenumber: float,
+    middle_range: float,
+) -> np.ndarray:
     """Samples at places on the track, m (n_p,), of scatterers seen from their pulse on, up to it if side is -1.
 
     sum_k b_k weight(s) exp(-j 2 k (R - r_c)), complex128 (n_p,);  k the wavenumber, rad/m, r_c the middle range, m

@@ -139,9 +139,14 @@ def _turning(weights: AntennaWeights, places: np.ndarray, spacing: int) -> float
 
 
 def _error(
-    sampled: Callable[[int], Sample], steep: Sequence[int], weights: AntennaWeights, polarizations: Sequence[str],
-    vertical: np.ndarray, frequency: float, nodes: PulseNodes,
-) -> float:  # fmt: skip
+    sampled: Callable[[int], Sample],
+    steep: Sequence[int],
+    weights: AntennaWeights,
+    polarizations: Sequence[str],
+    vertical: np.ndarray,
+    frequency: float,
+    nodes: PulseNodes,
+) -> float:
     """Relative error of amplitudes a quarter, a half and three quarters on from some of the nodes.
 
     sampled  facets that are sampled from a pulse on, and the number that each represents (k,)

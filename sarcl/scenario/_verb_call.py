@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from .. import verbs
+from ..base.forecast import Forecast
 from ..blocks.block_options import BlockOptions
 from ._schema import Where
 
@@ -31,7 +32,8 @@ class VerbCall:
         with self.where.blame((self.section,), self.keys, always=False):
             return getattr(verbs, self.section)(*self.subjects, **self.options)
 
-    def plan(self) -> Any:
-        """The forecast of the result."""
+    def plan(self) -> Forecast[Any]:
+        """Of the result."""
         with self.where.blame((self.section,), self.keys, always=False):
-            return verbs.plan(getattr(verbs, self.section), *self.subjects, **self.options)
+            forecast: Forecast[Any] = verbs.plan(getattr(verbs, self.section), *self.subjects, **self.options)
+        return forecast

@@ -150,7 +150,7 @@ class FullwavePlan:
         task = self.task
         names = task.polarizations
 
-        def every(values: Any) -> Any:
+        def every(values: np.ndarray | None) -> np.ndarray | None:
             return values if len(names) == 1 or values is None else np.repeat(values, len(names), axis=0)
 
         velocities = [t.velocities for t in (task.track, task.track if task.receiver is None else task.receiver)]

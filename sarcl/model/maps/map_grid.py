@@ -88,9 +88,10 @@ def on_map(
             f"bounds is {axes.bounds}; give them in units of the CRS {projection.text} ({projection.unit})"
         )
     validation.room(
-        f"positions of {axes.shape[0]} x {axes.shape[1]} pixels", 24.0 * axes.shape[0] * axes.shape[1],
+        f"positions of {axes.shape[0]} x {axes.shape[1]} pixels",
+        24.0 * axes.shape[0] * axes.shape[1],
         "give a larger spacing, or smaller bounds",
-    )  # fmt: skip
+    )
     x, y = axes.rows(0, axes.shape[0])
     longitude, latitude = projection.places(x, y)
     projection.check_reach(_border(longitude), _border(latitude))

@@ -5,8 +5,8 @@ Equations: docs/theory/sicd.md.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Literal, TypedDict
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Literal, TypedDict
 
 import numpy as np
 from numpy.polynomial import polynomial
@@ -350,7 +350,9 @@ def _directions(
     return out[0], out[1], coa
 
 
-def _fit(places: tuple[np.ndarray, np.ndarray], values: Any, scale: float, what: str) -> np.ndarray:
+def _fit(
+    places: tuple[np.ndarray, np.ndarray], values: Callable[..., np.ndarray], scale: float, what: str
+) -> np.ndarray:
     """A polynomial over the image; ValueError where none is near enough."""
     fit, error = _polynomials.surface(places, values, FIT[0] * scale)
     if error > FIT[1] * scale:
