@@ -132,7 +132,7 @@ def shares(task: FocusingTask, points: np.ndarray) -> np.ndarray:
 class GainsFloat64:
     """Buffers of an antenna for the kernels in float64, in the places of those of `TaperOnDevice`.
 
-    gain  True: they add up |g|^2 times the rows' weights, not the echoes
+    gain  True: they add up |g|^2 over that of the peak times the rows' weights, not the echoes
     """
 
     pixel_bytes = 0
@@ -140,7 +140,7 @@ class GainsFloat64:
     def __init__(self, device: Device, task: FocusingTask, gain: bool = False) -> None:
         assert task.antenna is not None
         self.device, self.beam, macros = device, task.antenna, task.antenna.macros(1)
-        self.patterns, _ = self.beam.upload(device, np.float64)
+        self.patterns, _ = self.beam.upload(device, np.float64, relative=gain)
         self.macros = {"WEIGHT": 3 if gain else 2, "GAINS": macros["GAINS"], "ALIKE": macros["ALIKE"]}
         self._weights = np.asarray(task.row_weight, np.float64) if gain else None
 
@@ -155,12 +155,15 @@ class GainsFloat64:
 
 
 class AntennaOnDevice:
-    """Buffers of an antenna for the kernels; gain  True: they add up |g|^2 times the rows' weights, not the echoes."""
+    """Buffers of an antenna for the kernels.
+
+    gain  True: they add up |g|^2 over that of the peak times the rows' weights, not the echoes
+    """
 
     def __init__(self, device: Device, task: FocusingTask, gain: bool) -> None:
         assert task.antenna is not None
         self.device, self.task, self.beam = device, task, task.antenna
-        self.patterns, self.second = self.beam.upload(device)
+        self.patterns, self.second = self.beam.upload(device, relative=gain)
         self.macros = {**self.beam.macros(1), "WEIGHT": 3 if gain else 2}
 
     def arguments(self, start: int, stop: int) -> tuple[Buffer, ...]:

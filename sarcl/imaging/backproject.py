@@ -249,8 +249,9 @@ def _antenna_gain(
     task: FocusingTask, chosen: MethodChoice, device: Device, options: BackprojectOptions
 ) -> float | np.ndarray | None:
     """Sums of the squared gains of the antenna times the weights, of the grid's shape, float32, or float64 of an image
-    in complex128; a number where they are the same in all pixels; None where they are 0 in all: the antenna sees no
-    pixel inside a range window."""
+    in complex128 and where float32 does not hold them; a number where they are the same in all pixels; None where they
+    are 0 in all: the antenna sees no pixel inside a range window."""
+    assert task.antenna is not None
     engine: Any = chosen.engine
     tiling, budget = chosen.tiling, options.budget(device)
     sums = engine(device, task, chosen.plan, tiling, gain=True)
@@ -260,9 +261,12 @@ def _antenna_gain(
         bands = BandBuffer(tiling, first, last, chosen.dtype)
         sums.fill(first, last, bands, budget, Clock(), lambda rows: None)
         flat[tiling.extent(first, last)] = bands.values.real
-    flat *= task.sample_weight.sum()
     if not flat.any():
         return None
+    peak, limits = task.antenna.peak**2 * float(task.sample_weight.sum()), np.finfo(np.float32)
+    if not float(limits.smallest_normal) <= peak * float(flat.max()) <= float(limits.max):
+        flat = flat.astype(np.float64)
+    flat *= peak
     return float(flat.flat[0]) if flat.min() == flat.max() > 0 else flat.reshape(task.grid.shape)
 
 

@@ -18,6 +18,7 @@ TABLE = ("azimuth", "elevation", "values")  # fields of the kind "table"
 KINDS = ("isotropic", "aperture", "gaussian", "table")
 LEVEL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))  # mount of an antenna along the body's axes
 MOST_DECIBELS = 300.0  # largest gain, dB: the squares of both antennas' amplitudes stay within float32
+AMPLITUDE = 1  # place of the peak's amplitude in the header
 HEADER = 16  # floats before the coefficients of a table, as kernels/pattern.clh reads them
 ANGLE_ERROR = 5e-7  # error of float32 directions in antenna axes, rad
 COSINE = 1e-5  # margin of limits of direction cosines, which kernels compute in float32
@@ -281,7 +282,7 @@ class Antenna:
         integers = numbers.view(f"i{numbers.itemsize}")
         integers[0] = KINDS.index(self.kind)
         shrinks = self.kind == "aperture" or self.frequency is not None
-        numbers[1:4] = self.amplitude, self.ratio(frequency), shrinks
+        numbers[AMPLITUDE], numbers[2:4] = self.amplitude, (self.ratio(frequency), shrinks)
         if self.kind == "aperture":
             numbers[4:6] = self.size * frequency / constants.SPEED_OF_LIGHT
             numbers[6:8] = (1 - self.taper) / (1 + self.taper) / 2

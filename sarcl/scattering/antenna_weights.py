@@ -12,7 +12,7 @@ import numpy as np
 from ..base.boxes import box
 from ..base.errors import ToleranceUnreachable
 from ..base.validation import instance
-from ..model.antenna import HEADER, Antenna, pair_of
+from ..model.antenna import AMPLITUDE, HEADER, Antenna, pair_of
 from ..model.radar import Radar, spreading
 from ..model.trajectory import Trajectory
 from ..model.waveform import Waveform
@@ -238,10 +238,17 @@ class AntennaWeights:
             "SPREADING": int(self.radar is not None),
         }
 
-    def upload(self, device: Device, dtype: type[np.floating] = np.float32) -> tuple[Buffer, int]:
+    def upload(
+        self, device: Device, dtype: type[np.floating] = np.float32, *, relative: bool = False
+    ) -> tuple[Buffer, int]:
         """Patterns on a device, one after the other, and the index at which the second begins; the last number of the
-        first header is that index too."""
+        first header is that index too.
+
+        relative  gains over `peak`, whose squares no number type loses
+        """
         packed = [one.packed(self.frequency, dtype) for one in self.patterns] or [np.zeros(HEADER, dtype)]
+        for one in packed if relative else ():
+            one[AMPLITUDE] = 1
         packed[0].view(f"i{packed[0].itemsize}")[HEADER - 1] = len(packed[0])
         return device.upload(np.concatenate(packed)), len(packed[0])
 

@@ -171,6 +171,21 @@ def test_an_antenna_that_looks_everywhere_changes_nothing():
     assert image.gain == pytest.approx(plain.gain, rel=1e-6)
 
 
+@pytest.mark.parametrize("gain_db", [-300.0, 200.0])
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-9])
+def test_gains_at_the_ends_of_what_an_antenna_takes_are_factors(gain_db, tolerance):
+    """The peaks' squares lie beyond float32, and the sums of weights with them; the image over its gain does not."""
+    raw, antenna = noise(), sarcl.Antenna.gaussian(width=(0.08, 0.3))
+    plain, strong = (
+        sarcl.backproject(raw, GRID, beam=(one, TRACK), tolerance=tolerance)
+        for one in (antenna, replace(antenna, gain_db=gain_db))
+    )
+    factor = 10 ** (gain_db / 10)  # two ways
+    assert np.abs(strong.gain / factor**2 / plain.gain - 1).max() < 1e-6
+    pixels = np.asarray(strong.data, np.complex128) / factor
+    assert np.linalg.norm(pixels - plain.data) <= 2 * tolerance * np.linalg.norm(plain.data)
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
