@@ -54,13 +54,15 @@ class WeightError:
     def check(self, tolerance: float) -> None:
         """Raise ToleranceUnreachable where rounding leaves too little of the tolerance."""
         if not self.rounding <= ROUNDING * tolerance:
+            below = 20 * np.log10(self.peak_to_rms)
+            helps = self.rounding <= ROUNDING * tolerance * self.peak_to_rms  # what echoes at the beam's peak meet
             raise ToleranceUnreachable(
                 tolerance,
                 self.rounding / ROUNDING * (1 + 1e-9),
                 "float32 gains of the antennas",
-                "aim at the scene",
-                how="with these antennas: gains are in float32, and the echoes lie "
-                f"{20 * np.log10(self.peak_to_rms):.0f} dB below the beam's peak",
+                "aim at the scene" if helps else "",
+                how="with these antennas: gains are in float32"
+                + (f", and the echoes lie {below:.0f} dB below the beam's peak" if below >= 0.5 else ""),
             )
 
     def of(self, n: int, tolerance: float) -> float:

@@ -227,6 +227,22 @@ def test_a_scene_out_of_the_beam_is_said():
         sarcl.echo(points(), NARROW, away, antenna=Antenna.gaussian(width=0.1))
 
 
+def test_to_aim_is_a_remedy_only_where_it_meets_the_tolerance():
+    antenna, point = Antenna.gaussian(width=0.1), sarcl.Scene.points([(0.0, 0.0, 0.0)])
+
+    def refusal(tolerance, aim):
+        with pytest.raises(sarcl.ToleranceUnreachable, match="gains are in float32") as refused:
+            sarcl.echo(point, NARROW, track(aim=aim), antenna=antenna, tolerance=tolerance)
+        return refused.value
+
+    aimed, beside = (0.0, 0.0, 0.0), (500.0, 0.0, 0.0)  # m; 0.1 rad from the point
+    least = refusal(1e-7, aimed)
+    assert "beam's peak" not in str(least) and least.remedy == f"pass tolerance={least.best:.1e} or larger"
+    assert refusal(1.2 * least.best, beside).remedy == "aim at the scene"
+    worse = refusal(0.5 * least.best, beside)
+    assert "dB below the beam's peak" in str(worse) and "aim" not in worse.remedy
+
+
 def test_an_antenna_on_a_scatterer():
     scene = points() + sarcl.Scene.points(track().positions[3:4])
     with pytest.raises(ValueError, match="stands on a scatterer"):
