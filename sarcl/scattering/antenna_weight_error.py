@@ -20,7 +20,7 @@ from ..numerics.polynomials import chebyshev
 from ..scene.scene import Scene
 from ..scene.triangles import areas, centroids
 from ._facet_sampling import drawn, facets_at
-from .antenna_weights import ANGLE, MOST_NODES, PATTERN, AntennaWeights, WeightError
+from .antenna_weights import ANGLE, MOST_NODES, PATTERN, PRODUCTS, AntennaWeights, WeightError
 from .facets import FacetSet
 
 # Errors are estimated from samples. (Weights are compared at a facet's corner, twice as far from the centroid as the
@@ -94,10 +94,9 @@ def _sampled(
     if not seen:
         return None
     dim = max(1.0, beam.peak * float(np.sqrt(total / seen)))
-    rounding = (
-        len(beam.patterns) * PATTERN * float(np.sqrt(blurred / seen)) + ANGLE * float(np.sqrt(floor / seen)) + 5e-7
-    )
-    return WeightError(dim, rounding, float(np.sqrt(bent / seen)), SAFETY * np.sqrt(left / seen))
+    at_peak = len(beam.patterns) * PATTERN
+    rounding = at_peak * float(np.sqrt(blurred / seen)) + ANGLE * float(np.sqrt(floor / seen)) + PRODUCTS
+    return WeightError(dim, rounding, at_peak + PRODUCTS, float(np.sqrt(bent / seen)), SAFETY * np.sqrt(left / seen))
 
 
 def _places(scene: Scene, random: np.random.Generator, many: int) -> tuple[np.ndarray, FacetSet, np.ndarray]:

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 ANGLE = 1e-7  # rad, bound of the rms error of float32 directions: 1e-8 to 3e-8 measured
 PATTERN = 1e-6  # bound of the rms error of float32 patterns relative to their peak: 1e-7 to 5e-7 measured
+PRODUCTS = 5e-7  # bound of the relative error of products of gains and spreading in float32
 MOST_NODES = 16  # frequencies, Chebyshev nodes over the band
 # of a tolerance: the most that rounding of gains in float32 may take, and with it their interpolation over the band
 ROUNDING, OVER_BAND = 0.3, 0.7
@@ -36,13 +37,14 @@ class WeightError:
     """Relative L2 errors of echoes that are due to errors of the antenna weights.
 
     peak_to_rms  largest possible weight over the root mean square of all weights, weighted by echo power; at least 1
-    rounding     error of directions and patterns in float32
+    rounding     error of directions and patterns in float32;  at_peak: the same, were all echoes at the beam's peak
     gradient     1/m, relative change of the weights per metre: the weight at a facet's centre is used for all of it
     over_band    [n]: error of interpolation between n Chebyshev nodes over the band, n = 1 ... MOST_NODES
     """
 
     peak_to_rms: float = 1.0
     rounding: float = 0.0
+    at_peak: float = 0.0
     gradient: float = 0.0
     over_band: np.ndarray = field(default_factory=lambda: np.zeros(MOST_NODES + 1))
 
@@ -55,7 +57,7 @@ class WeightError:
         """Raise ToleranceUnreachable where rounding leaves too little of the tolerance."""
         if not self.rounding <= ROUNDING * tolerance:
             below = 20 * np.log10(self.peak_to_rms)
-            helps = self.rounding <= ROUNDING * tolerance * self.peak_to_rms  # what echoes at the beam's peak meet
+            helps = below > 0 and self.at_peak <= ROUNDING * tolerance
             raise ToleranceUnreachable(
                 tolerance,
                 self.rounding / ROUNDING * (1 + 1e-9),
