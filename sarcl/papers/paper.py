@@ -15,7 +15,7 @@ import numpy as np
 from ..base.text import duration
 from ..figures import html
 from ..figures.html import Block, heading, listed, page, strip, table, terms, words
-from ..figures.plots import Curve
+from ..figures.plots import Curve, Limits
 from . import PAPERS
 
 Ends = tuple[float, float]
@@ -154,11 +154,14 @@ class Section:
         curves: Sequence[Curve],
         dots: bool | Sequence[str] = False,
         log_x: bool = False,
+        limits: Limits = (None, None),
         **words: object,
     ) -> None:
         """A figure of curves; words fill its texts."""
         texts = self._figure(key, words)
-        self.parts.append(html.plot(curves, texts["x"], texts["y"], texts["caption"], dots=dots, log_x=log_x))
+        self.parts.append(
+            html.plot(curves, texts["x"], texts["y"], texts["caption"], dots=dots, log_x=log_x, limits=limits)
+        )
 
     def picture(
         self, key: str, values: np.ndarray, x: Ends, y: Ends, words: Mapping[str, object] | None = None, **look: Any

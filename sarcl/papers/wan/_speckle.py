@@ -44,7 +44,9 @@ def section(lab: Lab) -> Section:
     levels = curves[0][1]
     out.plot("Amplitudes of the image's resolution cells", [*curves, ("Rayleigh", levels, rayleigh(levels))])
     out.plot(
-        "Phases of the image's resolution cells", [*phases, ("uniform", phases[0][1], np.full(16, 1 / (2 * np.pi)))]
+        "Phases of the image's resolution cells",
+        [*phases, ("uniform", phases[0][1], np.full(16, 1 / (2 * np.pi)))],
+        limits=(None, (0, 1 / np.pi)),  # from no density to twice the uniform one
     )
     (many_facets, *_), (few_facets, *_) = curves
     out.say(few=few, many=many, few_facets=few_facets, many_facets=many_facets)
