@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import sys
 import textwrap
 import tomllib
 from bisect import bisect_right
@@ -32,19 +31,6 @@ def tables(text: str, name: str) -> dict[str, Any]:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as exc:
         raise ValueError(_syntax(name, text, str(exc))) from None
-    except RecursionError:
-        raise too_deep(name) from None
-    except ValueError:  # of an integer with more digits than Python reads
-        long = re.search(rf"\d{{{sys.get_int_max_str_digits()}}}", text.replace("_", ""))
-        if long is None:
-            raise
-        line = text.replace("_", "")[: long.start()].count("\n") + 1
-        raise ValueError(f"{name}:{line}: an integer has thousands of digits; write it as a float, as 1e6") from None
-
-
-def too_deep(name: str) -> ValueError:
-    """The refusal of a text whose arrays or tables exceed Python's recursion."""
-    return ValueError(f"{name}: arrays or tables lie hundreds deep in each other; write them flat")
 
 
 def _syntax(name: str, text: str, message: str) -> str:

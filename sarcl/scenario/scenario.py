@@ -305,7 +305,4 @@ def loads(text: str, *, name: str = "scenario", folder: PathLike = ".") -> Scena
         if section not in _schema.SECTIONS:
             what = "table" if isinstance(value, (dict, list)) else "key"
             raise ValueError(f"{where.text((), section)} {unknown(section, list(_schema.SECTIONS), what)}")
-    try:
-        return Scenario(**tables, folder=folder, where=where)
-    except RecursionError:
-        raise toml.too_deep(name) from None
+    return Scenario(**tables, folder=folder, where=where)
