@@ -339,7 +339,6 @@ def test_interpolated_channels_that_cannot_keep_the_tolerance_give_way_before_an
 MAY_CATCH = {
     "bench/fastsar_peer.py": "a process of its own: what another library raises is a line of the table",
     "bench/_peers.py": "text that is no JSON",
-    "io/toml.py": "an integer with more digits than Python reads",
     "bench/_wait_idle.py": "/proc/stat of a system that has none",
     "base/arguments.py": "what numpy says of an index",
     "io/_checked_rows.py": "what h5py says of an index",
