@@ -14,7 +14,7 @@ import functools
 import inspect
 import textwrap
 from collections.abc import Callable
-from typing import Protocol, TypeVar
+from typing import Concatenate, ParamSpec, Protocol, TypeVar, cast
 
 from .forecast import Plan
 from .options import Options, described
@@ -22,6 +22,11 @@ from .text import unknown
 
 R_co = TypeVar("R_co", covariant=True)
 R = TypeVar("R")
+P = ParamSpec("P")
+S = TypeVar("S")
+A = TypeVar("A")
+B = TypeVar("B")
+C = TypeVar("C")
 MARK = "{options}"  # in the docstring of a verb: here its options are listed
 WIDTH = 116  # columns of a docstring without its indentation
 
@@ -66,25 +71,17 @@ def verb(
     def decorate(plan: Callable[..., Plan[R]]) -> Verb[R]:
         signature = inspect.signature(plan)
         subjects = [p for p in signature.parameters.values() if p.name != "options"]
-        names, known = [p.name for p in subjects], list(described(record))
+        names = [p.name for p in subjects]
 
-        def planned(*args: object, **options_by_name: object) -> Plan[R]:
-            if len(args) > len(names):
-                raise TypeError(f"{plan.__name__} takes {', '.join(names)} by position; give options by name")
-            for name in options_by_name:
-                if name in record.absent and name not in known:
-                    raise TypeError(f"{plan.__name__} has no option {name!r}: {record.absent[name]}")
-                if name not in known and name not in names:
-                    raise TypeError(f"{plan.__name__} has {unknown(name, known, 'option')}")
-            own = {name: options_by_name.pop(name) for name in names if name in options_by_name}
-            options = record(**options_by_name)
+        def planned(*args: object, **given: object) -> Plan[R]:
+            own, options = _split(plan.__name__, record, names, len(args), given)
             if plan_list and isinstance((dict(zip(names, args, strict=False)) | own).get(lists[0]), (list, tuple)):
                 return plan_list(plan, *args, **own, options=options)  # type: ignore[return-value]  # as the stub says
             return plan(*args, **own, options=options)
 
         @functools.wraps(plan)
-        def function(*args: object, **options_by_name: object) -> R:
-            return function.planned(*args, **options_by_name).run()  # type: ignore[attr-defined]
+        def function(*args: object, **given: object) -> R:
+            return function.planned(*args, **given).run()  # type: ignore[attr-defined]
 
         function.planned, function.options, function.lists = planned, record, lists  # type: ignore[attr-defined]
         function.__signature__ = signature.replace(  # type: ignore[attr-defined]
@@ -95,6 +92,49 @@ def verb(
         return function  # type: ignore[return-value]
 
     return decorate
+
+
+def constructor(
+    record: type[Options], call: Callable[P, object]
+) -> Callable[[Callable[[S, A, B, C], None]], Callable[Concatenate[S, P], None]]:
+    """Decorator of a class's __init__(self, a, b, options), which then takes the options of `record` by name.
+
+    call  what takes `a`, `b` and these options, such as a class of `record` with two more fields: for type checkers
+    """
+
+    def decorate(initialize: Callable[[S, A, B, C], None]) -> Callable[Concatenate[S, P], None]:
+        signature = inspect.signature(initialize)
+        subjects = [p for p in signature.parameters.values() if p.name != "options"]
+
+        @functools.wraps(initialize)
+        def function(*args: object, **given: object) -> None:
+            own, options = _split(type(args[0]).__name__, record, [p.name for p in subjects], len(args), given)
+            initialize(*args, **own, options=options)  # type: ignore[call-arg, arg-type]  # as decorate() says
+
+        parameters = [*subjects, *_keywords(record)]
+        function.options = record  # type: ignore[attr-defined]
+        function.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
+        return cast(Callable[Concatenate[S, P], None], function)
+
+    return decorate
+
+
+def _split(
+    name: str, record: type[Options], subjects: list[str], n_given: int, given: dict[str, object]
+) -> tuple[dict[str, object], Options]:
+    """Arguments given by name: the subjects among them, and the record of the options. TypeError for unknown ones, and
+    where more arguments are given by position than there are subjects."""
+    if n_given > len(subjects):
+        named = ", ".join(subject for subject in subjects if subject != "self")
+        raise TypeError(f"{name} takes {named} by position; give options by name")
+    known = list(described(record))
+    for option in given:
+        if option in record.absent and option not in known:
+            raise TypeError(f"{name} has no option {option!r}: {record.absent[option]}")
+        if option not in known and option not in subjects:
+            raise TypeError(f"{name} has {unknown(option, known, 'option')}")
+    own = {subject: given.pop(subject) for subject in subjects if subject in given}
+    return own, record(**given)
 
 
 def result_of(annotation: str) -> str:

@@ -12,6 +12,8 @@ For other folders:
     focus_options    options that the verbs which make images share
     focusing_task    the image to be made: echoes, grid, weights, geometry
     forecast         forecast of backproject; the speed of a device
+    kept_results     results that are kept: of one task, or the last ones under some keys
+    method_choice    the method that is chosen for a task, and choices that are kept
     pixel_taper      a taper over the aperture of each pixel
     profile_energy   energy of the range profiles against the energy at the pixels
     row_norms        norms of the rows with their weights, and a bound of the weighted samples
@@ -26,6 +28,7 @@ For other folders:
 
 For this folder alone:
 
+    _float32_methods  plans in complex64, direct and with sub-apertures
     _image_job       an image as a job that is computed in blocks
     _image_output    destination of pixels: memory, an array of the caller's, or a file
     _row_coverage    which rows saw a pixel, and the sum of their weights: the gain of the image

@@ -12,9 +12,9 @@ from ..blocks.block_job import BlockJob
 from ..blocks.dask_workers import portable
 from ..opencl.device import Device
 from .backproject_options import BackprojectOptions
-from .choose_method import MethodChoice
 from .engine import Engine, Skipped
 from .focusing_task import FocusingTask
+from .method_choice import MethodChoice
 
 
 @dataclass(frozen=True, eq=False)

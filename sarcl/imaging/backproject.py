@@ -30,11 +30,12 @@ from ._image_output import ImageOutput, is_path
 from ._row_coverage import room_for_gain, seen_by
 from .antenna_beam import shares
 from .backproject_options import BackprojectOptions
-from .choose_method import MethodChoice, choose
+from .choose_method import choose
 from .engine import Skipped
 from .focus_options import collection, relative_error
 from .focusing_task import FocusingTask
 from .forecast import forecast_of, speed
+from .method_choice import MethodChoice
 from .pixel_taper import PixelTaper
 from .unseen_pixels import unseen_pixels
 

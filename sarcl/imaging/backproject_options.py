@@ -17,9 +17,10 @@ from ..numerics import cost_model
 from ..numerics.cost_model import DeviceClass
 from ..opencl import native_functions
 from ..opencl.device import Device
-from .choose_method import METHODS, MethodChoice, choose
+from .choose_method import METHODS, choose
 from .focus_options import GridOptions
 from .focusing_task import BeamCone, FocusingTask, Skip, make_task
+from .method_choice import MethodChoice
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from dataclasses import dataclass
-from typing import Concatenate, Literal, ParamSpec, TypeVar
-from weakref import WeakKeyDictionary
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -99,27 +98,6 @@ class FocusingTask:
     def pairs(self) -> int:
         """Number of (row, pixel) pairs of these rows."""
         return self.raw.n_rows * self.grid.size
-
-
-Others = ParamSpec("Others")
-Result = TypeVar("Result")
-
-
-def per_task(
-    compute: Callable[Concatenate[FocusingTask, Others], Result],
-) -> Callable[Concatenate[FocusingTask, Others], Result]:
-    """Decorator of a function of a task and other arguments, all hashable and by position: its results are kept with
-    the task, because several plans are made for it."""
-    results: WeakKeyDictionary[FocusingTask, dict[object, Result]] = WeakKeyDictionary()
-
-    @functools.wraps(compute)
-    def kept(task: FocusingTask, *others: Others.args, **named: Others.kwargs) -> Result:
-        known = results.setdefault(task, {})
-        if others not in known:
-            known[others] = compute(task, *others, **named)
-        return known[others]
-
-    return kept
 
 
 def beam_of(raw: PhaseHistory, beam: object, center: np.ndarray) -> tuple[np.ndarray | None, float]:

@@ -20,9 +20,9 @@ from ..opencl.choose_device import open_devices
 from ..opencl.device import Device
 from . import profile_energy
 from .backproject_options import BackprojectOptions
-from .choose_method import MethodChoice
 from .factorized.plan import FactorPlan, moving_cost
 from .focusing_task import FocusingTask, make_task
+from .method_choice import MethodChoice
 from .unseen_pixels import unseen_pixels
 
 PROBE = 0.03  # s: shortest run of the kernel from which the speed of a device is measured

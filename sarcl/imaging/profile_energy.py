@@ -17,7 +17,8 @@ from ..numerics import interpolator_choice, range_profiles
 from ..numerics.interpolation import deconvolved
 from ..numerics.pulse_geometry import half_path
 from ..opencl import fft
-from .focusing_task import FocusingTask, per_task
+from .focusing_task import FocusingTask
+from .kept_results import per_task
 from .row_norms import row_norms
 
 FAINTEST = 1e-20  # share of the power beside the pixels, taken where every pixel is at an exact null of every row

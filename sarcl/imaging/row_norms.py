@@ -11,14 +11,14 @@ from ..base.fingerprint import checksum
 from ..base.threads import of_each, threads
 from ..model.lazy_rows import is_constant
 from ..model.phase_history import PhaseHistory
-from .focusing_task import FocusingTask, per_task
+from .focusing_task import FocusingTask
+from .kept_results import kept, per_task
 
 ALL = 2**28  # samples up to which every row is read
 IN_CACHE = 2**16  # samples whose squares are made at a time, so that they stay in a cache
 OF_THREAD = 2**21  # samples in memory that a thread reads at least: starting it takes as long as reading fewer
 TERMS32 = 128  # of sums of squares in float32, which are added up in float64
 NORMS32 = 1e-12, 1e15  # norms of rows whose squares float32 holds, less those that do not matter
-MOST_KEPT = 8  # windows whose norms are kept with the same samples
 
 _kept: WeakKeyDictionary[PhaseHistory, dict[str, np.ndarray]] = WeakKeyDictionary()
 
@@ -55,12 +55,8 @@ def _without_row_weights(task: FocusingTask) -> np.ndarray:
     """Norms of rows with the weights of the samples alone, (n_rows,)."""
     if not is_constant(task.raw.samples):
         return _norms(task.raw, task.sample_weight)
-    known, key = _kept.setdefault(task.raw, {}), checksum(task.sample_weight)
-    norms = known.pop(key, None)
-    known[key] = norms = _norms(task.raw, task.sample_weight) if norms is None else norms  # the last one
-    for oldest in list(known)[:-MOST_KEPT]:  # a copy: other threads may ask at the same time
-        known.pop(oldest, None)
-    return norms
+    key = checksum(task.sample_weight)
+    return kept(_kept.setdefault(task.raw, {}), key, lambda: _norms(task.raw, task.sample_weight))
 
 
 def _norms(raw: PhaseHistory, sample_weight: np.ndarray) -> np.ndarray:

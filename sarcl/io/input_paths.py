@@ -49,10 +49,10 @@ def contents(path: Path, what: str = "") -> bytes:
     return _read(path, what, -1)
 
 
-def head(path: Path, what: str = "", folder: str = "give the name of a file in it") -> bytes:
+def head(path: Path, folder: str) -> bytes:
     """The first 32 bytes of a file, after `check`."""
-    check(path, what, folder)
-    return _read(path, what, 32)
+    check(path, folder=folder)
+    return _read(path, "", 32)
 
 
 def _read(path: Path, what: str, n_bytes: int) -> bytes:

@@ -9,6 +9,7 @@ For this folder alone:
     _float64_pair  both directions in float64, one the transpose of the other to rounding
     _gradients     gradients of Re <y, A x> with respect to amplitudes and to what moves
     _measurement   what both directions share: rows, weights, pixels
+    _options       EchoesOptions: the options of the operator
     _shape_errors  a LinearOperator whose errors of shape name what was given
 """
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
-from typing import Literal, NoReturn
+from dataclasses import dataclass, replace
+from inspect import cleandoc
+from typing import NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,22 +15,19 @@ from scipy.sparse.linalg import LinearOperator
 
 from ..base.errors import ToleranceUnreachable
 from ..base.validation import choice, converted, count, finite, number
-from ..imaging.antenna_beam import AntennaBeam
+from ..base.verb import MARK, constructor, listed
 from ..imaging.backproject_options import BackprojectOptions
-from ..imaging.focusing_task import BeamCone
 from ..model.phase_history import PhaseHistory
-from ..model.waveform import Waveform
 from ..numerics.plan import LEAST_TOLERANCE
-from ..numerics.windows import Window
 from ..opencl.choose_device import open_device
-from ..opencl.device import DeviceChoice
 from ..opencl.memory_budget import budget
 from ..scattering.antenna_weights import AntennaWeights
 from ._autograd import host_array, jax_function, rows_of_batch, torch_batch, torch_function
 from ._float32_pair import Image, PointEchoes
 from ._float64_pair import ROWS, TransposedImage, choice_of
 from ._gradients import KINDS, Gradients, Kind
-from ._measurement import Arguments, Domain, RowsAsRead, measurement_of
+from ._measurement import Domain, RowsAsRead, measurement_of
+from ._options import EchoesOptions
 from ._shape_errors import NamedOperator
 
 MOST_ROUNDS = 200  # of the power iteration
@@ -57,99 +55,79 @@ class _Adjoint(NamedOperator):
         return self._of
 
 
+@dataclass(frozen=True, eq=False)
+class _Call(EchoesOptions):
+    """Arguments of Echoes, for type checkers."""
+
+    domain: Domain
+    like: PhaseHistory
+
+
 class Echoes(NamedOperator):
     """Echoes of points as a linear operator A of their amplitudes; A.H is the image of samples.
 
-        (A x)_pn = w_p w_n W(f_pn) sum_k v_p(x_k) g_p(x_k) x_k exp(-j 2 pi f_pn (tau_k(p) - tau_ref(p)))
+            (A x)_pn = w_p w_n W(f_pn) sum_k v_p(x_k) g_p(x_k) x_k exp(-j 2 pi f_pn (tau_k(p) - tau_ref(p)))
 
-    domain     the points: an ImageGrid, or positions, m (n, 3)
-    like       PhaseHistory whose positions, frequencies, reference ranges, channels and `weight` the rows have; its
-               samples are not read
-    tolerance  bound of the L2 error of A @ x, for amplitudes of random phases or equal ones, and of A.H @ y, for
-               samples whose energy lies in the ranges of the points; relative as in `sarcl.backproject`
-    exact      True: A.H is the adjoint of the very A that is computed, to rounding: both in float64, by the same
-               interpolation weights and phases. False: each direction is the cheapest plan of `echo` or `backproject`
-    method     "auto", "direct" or "factorized", as of `sarcl.echo` and `sarcl.backproject`; exact=True is direct
-    waveform   W is its matched spectrum; None: that of like.waveform, or 1
-    weights    w_p, one per row (n_rows,);  window  over samples and rows, as of `sarcl.backproject`
-    antenna    g_p: an Antenna, or (Antenna, aim), as beam= of `sarcl.backproject`: gains at the centre of the band
-    beam       the cone in which v_p is 1: its angle, rad, or (angle, direction), as of `sarcl.backproject`
-    wrap       False: v_p is 1 for |tau - tau_ref| <= 1/(2 frequency_step) alone
-    device     see `sarcl.devices`;  max_bytes  memory for blocks, as of `sarcl.backproject`
+        domain     the points: an ImageGrid, or positions, m (n, 3)
+        like       PhaseHistory whose positions, frequencies, reference ranges, channels and `weight` the rows have; its
+                   samples are not read
+    {options}
 
-    A has shape (rows times samples, points): samples are raw.samples.ravel(), amplitudes image.data.ravel(). It is
-    planned once; `predicted_error` is the larger one of both directions. Data are complex64, and complex128 for
-    tolerances below 1e-6; with exact=True also where the input is. Threads may share an operator: they take turns.
+        A has shape (rows times samples, points): samples are raw.samples.ravel(), amplitudes image.data.ravel(). It is
+        planned once; `predicted_error` is the larger one of both directions. Data are complex64, and complex128 for
+        tolerances below 1e-6; with exact=True also where the input is. Threads may share an operator: they take turns.
 
-    TypeError, ValueError: arguments that do not fit, naming them. ToleranceUnreachable, a ValueError: the tolerance
-    cannot be met. An operator cannot be pickled, and a process that was forked cannot use it: make it there.
-    Source: Farooq 2009, sections 2.2.2 and 2.3; docs/theory/linear.md.
+        TypeError, ValueError: arguments that do not fit, naming them. ToleranceUnreachable, a ValueError: the tolerance
+        cannot be met. An operator cannot be pickled, and a process that was forked cannot use it: make it there.
+        Source: Farooq 2009, sections 2.2.2 and 2.3; docs/theory/linear.md.
 
-    >>> operator = sarcl.linear.Echoes(grid, raw)
-    >>> pixels = operator.H @ raw.samples.ravel()
-    >>> np.allclose(pixels.reshape(grid.shape), image.data, atol=1e-2 * image.gain)
-    True
-    >>> x = np.ones(operator.shape[1], np.complex64)
-    >>> np.allclose(operator.normal(x), operator.H @ operator.dot(x), rtol=1e-2, atol=1e-2 * operator.norm())
-    True
-    >>> gradients = operator.gradients(x, raw.samples.ravel(), of="tx")
-    >>> moved = operator.at(tx=raw.tx + 0.01)
-    >>> y = operator.A(x.reshape(grid.shape))
-    >>> operator.A_adjoint(y).shape
-    (128, 128)
-    >>> f = operator.torch()  # needs sarcl[torch]
-    >>> g = operator.jax()  # needs sarcl[jax]
+        >>> operator = sarcl.linear.Echoes(grid, raw)
+        >>> pixels = operator.H @ raw.samples.ravel()
+        >>> np.allclose(pixels.reshape(grid.shape), image.data, atol=1e-2 * image.gain)
+        True
+        >>> x = np.ones(operator.shape[1], np.complex64)
+        >>> np.allclose(operator.normal(x), operator.H @ operator.dot(x), rtol=1e-2, atol=1e-2 * operator.norm())
+        True
+        >>> gradients = operator.gradients(x, raw.samples.ravel(), of="tx")
+        >>> moved = operator.at(tx=raw.tx + 0.01)
+        >>> y = operator.A(x.reshape(grid.shape))
+        >>> operator.A_adjoint(y).shape
+        (128, 128)
+        >>> f = operator.torch()  # needs sarcl[torch]
+        >>> g = operator.jax()  # needs sarcl[jax]
     """
 
-    def __init__(
-        self,
-        domain: Domain,
-        like: PhaseHistory,
-        *,
-        tolerance: float = 1e-3,
-        exact: bool = False,
-        method: Literal["auto", "direct", "factorized"] = "auto",
-        waveform: Waveform | None = None,
-        weights: ArrayLike | None = None,
-        antenna: AntennaBeam | None = None,
-        beam: BeamCone | None = None,
-        window: Window | None = None,
-        wrap: bool = False,
-        device: DeviceChoice | None = None,
-        max_bytes: float | None = None,
-    ) -> None:
-        arguments = Arguments(
-            tolerance, exact, method, waveform, weights, antenna, beam, window, wrap, device, max_bytes
-        )
-        self._prepare(domain, like, arguments)
+    @constructor(EchoesOptions, _Call)
+    def __init__(self, domain: Domain, like: PhaseHistory, options: EchoesOptions) -> None:
+        self._prepare(domain, like, options)
 
     def _prepare(
         self,
         domain: Domain,
         like: PhaseHistory,
-        arguments: Arguments,
+        options: EchoesOptions,
         known: TransposedImage | None = None,
         aimed: AntennaWeights | None = None,
     ) -> None:
         """Plan; in float64 as a known pair, where that plan holds; aimed  gains whose axes the antennas keep."""
-        self._domain, self._like, self._arguments = domain, like, arguments
-        self.tolerance, self.exact = float(arguments.tolerance), bool(arguments.exact)
-        self._device, self._lock = open_device(arguments.device), threading.RLock()
-        self._measurement = measurement = measurement_of(domain, like, arguments, aimed)
-        self._available = budget(self._device, arguments.max_bytes)
+        self._domain, self._like, self._options = domain, like, options
+        self.tolerance, self.exact = float(options.tolerance), bool(options.exact)
+        self._device, self._lock = open_device(options.device), threading.RLock()
+        self._measurement = measurement = measurement_of(domain, like, options, aimed)
+        self._available = budget(self._device, options.max_bytes)
         self._gradients: Gradients | None = None
         self._forward: PointEchoes | TransposedImage
         if self.exact or self.tolerance < LEAST_TOLERANCE or measurement.is_cut or not self._plan_in_float32():
-            self._forward = self._float64_pair(arguments.method, known)
-            self._image = Image(self._options(self.tolerance), measurement, self._forward.choice)
+            self._forward = self._float64_pair(options.method, known)
+            self._image = Image(self._image_options(self.tolerance), measurement, self._forward.choice)
         self._pair = self._forward if isinstance(self._forward, TransposedImage) else None
         self.predicted_error = max(self._forward.predicted_error, self._image.choice.predicted_error)
         dtype = np.complex128 if self.tolerance < LEAST_TOLERANCE else np.complex64
         rows, samples = measurement.shape
         super().__init__(dtype, (rows * samples, measurement.task.grid.size))
 
-    def _options(self, tolerance: float) -> BackprojectOptions:
-        method, most = self._arguments.method, self._arguments.max_bytes
+    def _image_options(self, tolerance: float) -> BackprojectOptions:
+        method, most = self._options.method, self._options.max_bytes
         return BackprojectOptions(tolerance=tolerance, method=method, device=self._device, max_bytes=most)
 
     def _plan_in_float32(self) -> bool:
@@ -158,7 +136,7 @@ class Echoes(NamedOperator):
         few = math.sqrt(min(measurement.seen_pixels, math.prod(measurement.shape)) / MANY)
         least = max(self.tolerance * min(max(few, LEAST_SHARE), 1.0), LEAST_TOLERANCE)
         for tolerance in sorted({least, self.tolerance}):
-            options, method = self._options(tolerance), self._arguments.method
+            options, method = self._image_options(tolerance), self._options.method
             try:
                 chosen = options.choose(measurement.task, [self._device])
                 self._forward = PointEchoes(self._device, measurement, tolerance, method, self._available)
@@ -275,7 +253,7 @@ class Echoes(NamedOperator):
             like = replace(like, reference_range=converted("reference_range", reference_range, np.float64))
         moved = Echoes.__new__(Echoes)
         domain = self._domain if positions is None else positions
-        moved._prepare(domain, like, self._arguments, self._pair, self._measurement.task.antenna)
+        moved._prepare(domain, like, self._options, self._pair, self._measurement.task.antenna)
         return moved
 
     def torch(self) -> Callable[..., object]:
@@ -389,3 +367,6 @@ class Echoes(NamedOperator):
             "sarcl.linear.Echoes holds memory of a device and cannot be pickled or copied; make it in the process that "
             "uses it"
         )
+
+
+Echoes.__doc__ = cleandoc(Echoes.__doc__ or "").replace(MARK, listed(EchoesOptions))

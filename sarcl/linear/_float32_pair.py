@@ -12,8 +12,8 @@ from ..base.stage_timer import Clock
 from ..imaging import antenna_beam
 from ..imaging.backproject import BackprojectPlan
 from ..imaging.backproject_options import BackprojectOptions
-from ..imaging.choose_method import MethodChoice
 from ..imaging.focusing_task import FocusingTask
+from ..imaging.method_choice import MethodChoice
 from ..imaging.tiling.of_grid import tiling_of
 from ..model.waveform import Waveform
 from ..opencl.device import Device

@@ -11,9 +11,10 @@ import numpy as np
 from ..base.errors import ToleranceUnreachable
 from ..base.morton import morton_order
 from ..imaging.antenna_beam import rounding
-from ..imaging.choose_method import MethodChoice, in_float64
+from ..imaging.choose_method import in_float64
 from ..imaging.float64.direct import N_CONST, by_range, packed, remedy, weights_on
 from ..imaging.float64.plan import SIDES, Float64Plan
+from ..imaging.method_choice import MethodChoice
 from ..imaging.pixel_taper import WEIGHT_BUFFERS
 from ..imaging.tiling.of_grid import tiling_of
 from ..model.waveform import Waveform

@@ -5,23 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base import validation
 from ..base.constants import SPEED_OF_LIGHT
 from ..base.validation import instance
-from ..imaging.antenna_beam import AntennaBeam, antenna_of, is_antenna
-from ..imaging.choose_method import METHODS
-from ..imaging.focusing_task import BeamCone, FocusingTask, Skip, all_lit, geometry_of, make_task
+from ..imaging.antenna_beam import antenna_of, is_antenna
+from ..imaging.focusing_task import FocusingTask, Skip, all_lit, geometry_of, make_task
 from ..model.image_grid import ImageGrid
 from ..model.phase_history import PhaseHistory
 from ..model.waveform import Waveform
-from ..numerics.windows import Window
-from ..opencl.device import DeviceChoice
 from ..scattering.antenna_weights import AntennaWeights
+from ._options import EchoesOptions
 
 Domain: TypeAlias = ImageGrid | ArrayLike
 SKIPS: tuple[Skip, ...] = (
@@ -133,37 +130,14 @@ class Measurement:
         return np.asarray(out)
 
 
-@dataclass(frozen=True, eq=False)
-class Arguments:
-    """Options of `Echoes`, as it takes them; checked where they are used, or here."""
-
-    tolerance: float
-    exact: bool
-    method: Literal["auto", "direct", "factorized"]
-    waveform: Waveform | None
-    weights: ArrayLike | None
-    antenna: AntennaBeam | None
-    beam: BeamCone | None
-    window: Window | None
-    wrap: bool
-    device: DeviceChoice | None
-    max_bytes: float | None
-
-    def __post_init__(self) -> None:
-        validation.tolerance(self.tolerance)
-        validation.flag("exact", self.exact)
-        validation.flag("wrap", self.wrap)
-        validation.choice("method", self.method, METHODS)
-
-
 def measurement_of(
-    domain: Domain, like: PhaseHistory, arguments: Arguments, aimed: AntennaWeights | None = None
+    domain: Domain, like: PhaseHistory, options: EchoesOptions, aimed: AntennaWeights | None = None
 ) -> Measurement:
-    """The measurement for the arguments of `Echoes`; ValueError or TypeError for arguments that do not fit.
+    """The measurement for the options of `Echoes`; ValueError or TypeError for options that do not fit.
 
-    aimed  gains of arguments.antenna that are aimed already: only the places of the antennas are new
+    aimed  gains of options.antenna that are aimed already: only the places of the antennas are new
     """
-    antenna, beam, wrap = arguments.antenna, arguments.beam, bool(arguments.wrap)
+    antenna, beam, wrap = options.antenna, options.beam, bool(options.wrap)
     instance("like", like, PhaseHistory)
     grid = domain if isinstance(domain, ImageGrid) else ImageGrid.points(domain)
     if is_antenna(beam):
@@ -173,7 +147,7 @@ def measurement_of(
     )
     samples = Samples(noise)
     raw = replace(like, samples=samples, report=None)
-    task = make_task(raw, grid, arguments.window, arguments.weights, wrap, SKIPS, beam, sum_polarizations=True)
+    task = make_task(raw, grid, options.window, options.weights, wrap, SKIPS, beam, sum_polarizations=True)
     rows, across = task.row_weight, task.sample_weight
     task = replace(task, row_weight=np.ones_like(rows), sample_weight=np.ones_like(across))
     if task.antennas.beam is not None and all_lit(task.antennas, grid):
@@ -185,7 +159,7 @@ def measurement_of(
             raise TypeError(f"antenna is a {type(antenna).__name__}; give an Antenna, or (antenna, aim)")
         center = grid.bounds.mean(axis=0) if grid.center is None else grid.center
         task = replace(task, antenna=antenna_of(raw, antenna, center, "antenna"))
-    pulse = like.waveform if arguments.waveform is None else arguments.waveform
+    pulse = like.waveform if options.waveform is None else options.waveform
     band = across[None]
     if pulse is not None:
         instance("waveform", pulse, Waveform)

@@ -48,19 +48,14 @@ def rows(
     data: np.ndarray,
     *,
     inverse: bool = False,
-    engine: str | None = None,
     overwrite: bool = False,
 ) -> np.ndarray:
     """FFT of every row of complex (n, m) `data`, not normalised in either direction; the type is kept.
 
-    device  None: on the host
-    engine  "reikna" or "scipy"; default by the kind of device. complex128 goes to reikna only where rows are a power
-            of two long: for other lengths the error is 1e-16 times the length (measured: 9e-12 at 98 304)
+    device  by `reikna_rows` where it transforms rows of this length (`on_device`); else, and None: on the host
     overwrite  `data` may be changed, and the result may lie there
     """
-    if engine is None and device is not None and on_device(device, data.shape[1], data.dtype):
-        engine = "reikna"
-    if device is not None and engine == "reikna":
+    if device is not None and on_device(device, data.shape[1], data.dtype):
         return reikna_rows(device, data, inverse)
     return _scipy_transform()(data, (1,), not inverse, 0, data if overwrite else None, threads())
 
@@ -91,7 +86,10 @@ def _scipy_transform() -> Callable[..., np.ndarray]:
 
 
 def on_device(device: Device, length: int, dtype: DTypeLike) -> bool:
-    """Whether `rows` of this length and complex type are transformed on the device, and not on the host."""
+    """Whether `rows` of this length and complex type are transformed on the device, and not on the host.
+
+    Of complex128 rows of a power of two alone: of other lengths the error is 1e-16 times the length (9e-12 at 98 304).
+    """
     double = device.info.fp64 and length & (length - 1) == 0
     return not device.is_cpu and (dtype == np.complex64 or double)
 

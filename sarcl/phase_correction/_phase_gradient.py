@@ -27,6 +27,7 @@ FEW = 8  # pulses at a time, whose contributions fit in a processor's cache
 LARGE, PARTS = 2**20, 4  # contributions from which their sums are made in parts, by several threads, and how many
 POWER_STEPS = 10  # iterations of the power method
 NARROWEST = 10.0  # Doppler bins, smallest window of `gradient` about a point
+ENOUGH = 1e-4  # relative gain in sharpness of a step, below which no further one is made
 
 
 def gradient(v: np.ndarray, widths: list[float]) -> np.ndarray:
@@ -70,11 +71,11 @@ def focused(v: np.ndarray, middle: np.ndarray, number: int, window: float) -> tu
     return phase, sharpness(v, phase, width) / max(levels[0], 1e-300)
 
 
-def sharpen(v: np.ndarray, phase: np.ndarray, width: float, steps: int = 30, enough: float = 1e-4) -> np.ndarray:
+def sharpen(v: np.ndarray, phase: np.ndarray, width: float, steps: int = 30) -> np.ndarray:
     """The phase (n,) near `phase` where sum |I|^4 over `width` Doppler bins about 0 has its maximum.
 
     I is the FFT over pulses of v exp(-j phase); for width 0 only its bin 0, the image at the places themselves.
-    Stops after `steps`, or when the relative gain of a step is less than `enough`.
+    Stops after `steps`, or when the relative gain of a step is less than ENOUGH.
     """
     before = 0.0
     for _ in range(steps):
@@ -84,7 +85,7 @@ def sharpen(v: np.ndarray, phase: np.ndarray, width: float, steps: int = 30, eno
             back = _back(image, len(v))
             pull += _like(v, back[0]) if len(back) == 1 else (back.conj() * v[:, columns]).sum(axis=1)
         phase = phase + np.where(pull == 0, 0, np.angle(pull * np.exp(-1j * phase)))
-        if total <= before * (1 + enough):
+        if total <= before * (1 + ENOUGH):
             break
         before = total
     return phase

@@ -14,6 +14,7 @@ For other folders:
 For this folder alone:
 
     _changes   scenes that follow from a scene: moved, placed, realized, cut; methods of Scene
+    _fields    fields of a scene as read-only arrays, checked
     _kept      results that follow from a scene alone, for later calls
     _solids    triangles of surfaces of revolution, prisms and geodesic spheres
     _tank      the parts of a tank

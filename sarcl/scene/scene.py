@@ -15,11 +15,11 @@ from numpy.typing import ArrayLike, NDArray
 from ..base import validation
 from ..base.boxes import box
 from ..base.text import NotebookTable, interval
-from . import _changes, terrain
+from . import _changes, _fields, terrain
 from . import triangles as geometry
 from ._kept import Kept
 from .material import Material
-from .material_arguments import FacetMaterials, MaterialLike, checked_table, merge, resolve
+from .material_arguments import FacetMaterials, MaterialLike, merge, resolve
 
 if TYPE_CHECKING:
     import trimesh
@@ -97,49 +97,7 @@ class Scene(NotebookTable):
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        for name in ("positions", "triangles"):
-            validation.ndim(f"scene {name}", getattr(self, name))
-        n, k = (np.shape(a)[0] if np.ndim(a) else 1 for a in (self.positions, self.triangles))
-        if n + k == 0:
-            raise ValueError("scene is empty; give it at least one point or facet")
-        if self.material is None:
-            object.__setattr__(self, "material", np.broadcast_to(np.int32(0), (k,)))
-        if self.point_roughness is None:
-            object.__setattr__(self, "point_roughness", _changes.no_displacements(k))
-        if self.apertures is None:
-            object.__setattr__(self, "apertures", np.broadcast_to(0.0, (n,)))
-        shapes: dict[str, tuple[int, ...]] = {"positions": (n, 3), "amplitudes": (n,), "apertures": (n,)}
-        shapes |= {"triangles": (k, 3, 3), "point_roughness": (k, 3, 3)}
-        dtypes = {"amplitudes": np.complex128, "two_sided": np.bool_, "material": np.int32}
-        for name in _ARRAYS:
-            value, dtype = getattr(self, name), dtypes.get(name, np.float64)
-            # read-only arrays are not copied
-            if not isinstance(value, np.ndarray) or value.flags.writeable or value.dtype != dtype:
-                value = validation.sealed(validation.converted(f"scene {name}", value, dtype))
-            expected = shapes.get(name, (k,))
-            if value.shape != expected:
-                raise ValueError(f"scene {name} has shape {value.shape}, wanted {expected}")
-            validation.finite(
-                f"scene {name}", value if any(value.strides) else value[:1]
-            )  # broadcast: one number for all
-            object.__setattr__(self, name, value)
-        if (self.roughness < 0).any():
-            row = int(np.argmin(self.roughness))
-            raise ValueError(f"roughness[{row}] is {self.roughness[row]:g} m; a standard deviation cannot be negative")
-        if (self.apertures < 0).any():
-            row = int(np.argmin(self.apertures))
-            raise ValueError(f"apertures[{row}] is {self.apertures[row]:g} m^2; an area cannot be negative")
-        table, factor = checked_table(self.materials, self.material)
-        if factor is not None:
-            object.__setattr__(self, "reflectivity", validation.sealed(self.reflectivity * factor))
-        object.__setattr__(self, "materials", table)
-        closed = self.sheets & ~self.two_sided
-        if closed.any():
-            row = int(np.argmax(closed))
-            raise ValueError(
-                f"facet {row} reflects from one side alone, as a closed body does, and its material has a thickness of "
-                f"{table[self.material[row]].thickness:g} m; sheets are open: give two_sided=True, or no thickness"
-            )
+        _fields.check(self)
 
     @classmethod
     def points(cls, positions: ArrayLike, amplitudes: ArrayLike = 1.0, *, apertures: ArrayLike = 0.0) -> Scene:
@@ -345,7 +303,7 @@ class Scene(NotebookTable):
             return NotImplemented
         table, places = merge([self.materials, other.materials])
         moves = self.has_random_points or other.has_random_points
-        names = (n for n in _ARRAYS if n != "point_roughness" or moves)
+        names = (n for n in _fields.ARRAYS if n != "point_roughness" or moves)
         joined = {n: validation.sealed(np.concatenate([getattr(self, n), getattr(other, n)])) for n in names}
         parts = [p[s.material] for p, s in zip(places, (self, other), strict=True)]
         joined["material"] = validation.sealed(np.concatenate(parts))
@@ -397,6 +355,3 @@ class Scene(NotebookTable):
     def kept(self) -> Kept:
         """Results that follow from the scene alone, which calls of the verbs share; for the library's own use."""
         return Kept()
-
-
-_ARRAYS = ("positions", "amplitudes", "apertures", *_changes.FACET_ARRAYS)

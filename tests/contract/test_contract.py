@@ -11,8 +11,8 @@ from helpers.contract_cases import build, draw
 
 import sarcl
 from sarcl.bench.exact import backproject as quick_sum
-from sarcl.imaging.choose_method import kept_plans
 from sarcl.imaging.direct import direct, line_plan
+from sarcl.imaging.method_choice import kept_plans
 from sarcl.numerics import interpolation, interpolator_choice
 from sarcl.opencl.choose_device import open_device
 

@@ -10,8 +10,8 @@ import pytest
 from helpers.cases import noise_history
 
 import sarcl
-from sarcl.imaging.choose_method import kept_plans
 from sarcl.imaging.direct import line_plan
+from sarcl.imaging.method_choice import kept_plans
 from sarcl.numerics import interpolation, interpolator_choice
 from sarcl.reference.backproject import backproject as exact
 from sarcl.reference.geometry import half_path

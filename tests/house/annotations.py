@@ -61,12 +61,14 @@ def stub() -> tuple[dict[str, typing.Any], dict[str, list[inspect.Signature]]]:
 
 
 def verb_signature(verb: typing.Any) -> inspect.Signature:
-    """The signature of a verb with types for their texts, each as the module in which it is written means it."""
+    """The signature of a verb, or of a constructor whose options are a record, with types for their texts, each as the
+    module in which it is written means it."""
     homes = {name: kind for kind in reversed(verb.options.__mro__) for name in inspect.get_annotations(kind)}
     signature = inspect.signature(verb)
     parameters = [
         p.replace(annotation=eval(p.annotation, namespace(homes.get(p.name, verb))))
         for p in signature.parameters.values()
+        if p.name != "self"
     ]
     result = eval(signature.return_annotation, namespace(verb))
     return signature.replace(parameters=parameters, return_annotation=result)

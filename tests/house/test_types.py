@@ -16,7 +16,7 @@ from importlib.resources import files
 from pathlib import Path
 
 import pytest
-from house.annotations import hints_of, namespace, stub
+from house.annotations import hints_of, namespace, stub, verb_signature
 
 import sarcl
 from sarcl import motion, shapes
@@ -90,6 +90,9 @@ def parameters(thing: typing.Any) -> dict[str, typing.Any]:
             assert one.annotation is not None
             found[f"{one.arg}"] = eval(ast.unparse(one.annotation), names)
     for call in methods_of(thing) if inspect.isclass(thing) else [thing]:
+        if hasattr(call, "options"):
+            found |= {f"{call.__name__}({p.name})": p.annotation for p in verb_signature(call).parameters.values()}
+            continue
         hints = hints_of(call, names)
         written = inspect.signature(call, follow_wrapped=False).parameters if not hasattr(call, "__signature__") else {}
         code = call.__code__

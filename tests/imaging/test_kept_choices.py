@@ -15,9 +15,11 @@ import sarcl
 from sarcl.base.errors import ToleranceUnreachable
 from sarcl.blocks.bands import LEAST_BYTES, pages_in_use
 from sarcl.imaging import row_norms
-from sarcl.imaging.choose_method import MOST_CHOICES, STEPS, choose
+from sarcl.imaging.choose_method import choose
 from sarcl.imaging.direct import direct
 from sarcl.imaging.focusing_task import make_task
+from sarcl.imaging.kept_results import MOST
+from sarcl.imaging.method_choice import STEPS
 from sarcl.model.lazy_rows import is_constant
 from sarcl.numerics.cost_model import CPU
 
@@ -61,7 +63,7 @@ def test_a_choice_is_kept_for_equal_tasks_and_made_again_for_others(change):
 def test_few_choices_are_kept_and_none_longer_than_the_echoes():
     raw = noise_history()
     first = weakref.ref(chosen(raw))
-    for n in range(MOST_CHOICES):
+    for n in range(MOST):
         chosen(raw, tolerance=2e-2 + 1e-3 * n)
     gc.collect()
     assert first() is None

@@ -400,6 +400,7 @@ def test_wrong_input_is_refused(wrong, error, match):
     ("options", "error", "match"),
     [
         ({"tolerance": 1e-17}, ValueError, "tolerance"),
+        ({"tolerence": 1e-3}, TypeError, "did you mean 'tolerance'"),
         ({"method": "fast"}, ValueError, "method"),
         ({"exact": "yes"}, TypeError, "exact"),
         ({"exact": True, "method": "factorized"}, ValueError, "float64"),

@@ -53,7 +53,7 @@ def test_batches_are_smaller_on_slow_devices(device):
 def test_a_launch_that_lasts_long_makes_the_next_batches_smaller(device, monkeypatch, planned):
     gpu, data = Device(replace(device.info, kind="gpu"), device._raw, Limits(transform=16 * 64)), noise(40, 64)
     monkeypatch.setattr(fft, "lasted", lambda event, enqueued: fft.LASTS * planned[-1][0] / 5)  # five rows in fft.LASTS
-    made = fft.rows(gpu, data, engine="reikna")
+    made = fft.reikna_rows(gpu, data, False)
     assert np.linalg.norm(made - np.fft.fft(data)) <= 1e-6 * np.linalg.norm(made)
     assert planned == [(16, 64), *5 * [(5, 64)]]
     assert fft.rows_at_once(gpu, 64) == 5 and fft.rows_at_once(gpu, 128) == 2
@@ -73,9 +73,9 @@ def test_many_rows_have_the_bits_of_scipy_fft(dtype, inverse):
 
     data = noise(40, 99).astype(dtype)
     wanted = scipy.fft.ifft(data, norm="forward") if inverse else scipy.fft.fft(data)
-    np.testing.assert_array_equal(fft.rows(None, data, inverse=inverse, engine="scipy"), wanted)
+    np.testing.assert_array_equal(fft.rows(None, data, inverse=inverse), wanted)
     buffer = data.copy()
-    np.testing.assert_array_equal(fft.rows(None, buffer, inverse=inverse, engine="scipy", overwrite=True), wanted)
+    np.testing.assert_array_equal(fft.rows(None, buffer, inverse=inverse, overwrite=True), wanted)
 
 
 PROCESS = """

@@ -11,7 +11,8 @@ from ...base.constants import SPEED_OF_LIGHT
 from ...base.rows import spread_over
 from ...model.image_grid import ImageGrid
 from ...numerics.pulse_geometry import PulseGeometry
-from ..focusing_task import FocusingTask, per_task
+from ..focusing_task import FocusingTask
+from ..kept_results import per_task
 from ..tiling.plane import outline
 
 LEAST_CELLS = 1e-30  # resolution cells per pixel; as LEAST_STEP of kernels/backproject_lines.cl

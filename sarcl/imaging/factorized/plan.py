@@ -21,7 +21,8 @@ from ...opencl import fft
 from ..direct import line_plan
 from ..direct.line_plan import LinePlan
 from ..direct.tile_kernels import CHUNK
-from ..focusing_task import FocusingTask, per_task
+from ..focusing_task import FocusingTask
+from ..kept_results import per_task
 from ..tiling.of_grid import tiling_of
 from ..tiling.plane import LineTiling
 from ..tiling.tiling import Tiling

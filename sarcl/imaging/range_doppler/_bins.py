@@ -159,10 +159,9 @@ class Bins:
         nodes = ranges[0] + spacing * SEGMENT * np.arange(n_segments + 1)
         speed, offset, shift = self.plan.fit.at(nodes)
         cosine = np.sqrt(np.maximum(1 - (SPEED_OF_LIGHT * doppler[:, None] / (2 * speed * self.center)) ** 2, 1e-3))
-        start = float(self.plan.times[0]) - self.track.start
         position = (nodes / cosine + (offset - self.plan.center)) / self.sample
         cycles = 2 / SPEED_OF_LIGHT * self.center * (nodes * cosine + (offset - self.plan.center))
-        cycles += doppler[:, None] * (start + shift)
+        cycles += doppler[:, None] * (float(self.plan.times[0]) + shift)
         step, slope = np.diff(position) / SEGMENT, np.diff(cycles) / SEGMENT
         position, cycles = position[:, :-1], cycles[:, :-1]
         samples = np.floor(position)

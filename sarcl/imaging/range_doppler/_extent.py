@@ -115,7 +115,7 @@ def choose_extent(view: View, options: RangeDopplerOptions, allowed: float) -> E
     n_ranges = int(np.floor((far - near) / column + 1e-6)) + 1
     _check_pixels(n_times, n_ranges)
     u, r = times[0] + track.step / finer * np.arange(n_times), near + column * np.arange(n_ranges)
-    corners = sine(u[[0, -1], None, None], r[[0, -1], None], np.array([track.start, track.stop]), speed)
+    corners = sine(u[[0, -1], None, None], r[[0, -1], None], np.array([0.0, track.stop]), speed)
     used = _sines_used(sight, corners, u)
     _warn_of_ambiguities(sight, float(np.ptp(corners, axis=(0, 2)).max()), float(r[-1] - r[0]))
     zone = sight.zone(float(r[0]))
@@ -192,7 +192,7 @@ class _Sight:
     @property
     def middle(self) -> float:
         """Zero-Doppler time that the middle of the track sees, s."""
-        return (self.track.start + self.track.stop) / 2 + delay(self.centroid, self.about, self.speed)
+        return self.track.stop / 2 + delay(self.centroid, self.about, self.speed)
 
     @property
     def hertz(self) -> float:
@@ -232,8 +232,8 @@ def _default_half(sight: _Sight, window: RangeWindow, middle: float, near: float
     a share `held` of the slant ranges is left: under squint points far along the track leave the range window.
     """
     track = sight.track
-    half = (track.stop - track.start) / 2
-    ends = np.array([track.start, track.stop])
+    half = track.stop / 2
+    ends = np.array([0.0, track.stop])
 
     def image_band(half: float) -> float:
         return float(np.ptp(sine(middle + half * np.array([[-1.0], [1.0]]), np.array(near), ends, sight.speed)))

@@ -197,7 +197,7 @@ def _doppler_bins(track: Track, extent: Extent, frequencies: np.ndarray, speeds:
     slow, fast = float(speeds.min()), float(speeds.max())
     earliest = delay(low, ranges[-1 if low < 0 else 0], slow if low < 0 else fast)
     latest = delay(high, ranges[-1 if high > 0 else 0], slow if high > 0 else fast)
-    span = max(latest - (times[0] - track.stop), times[-1] - track.start - earliest)
+    span = max(latest - (times[0] - track.stop), times[-1] - earliest)
     length = fft.good_length(int(np.ceil(span / track.step)) + 16)
     doppler = [2 * v * s * f / SPEED_OF_LIGHT for v in (slow, fast) for s in (low, high) for f in frequencies]
     scale = length * track.step

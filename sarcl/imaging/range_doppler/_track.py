@@ -23,13 +23,12 @@ class Track:
     """Positions of the phase centre, midway between transmitter and receiver, as polynomials of time.
 
     epoch         time of the first row, s, from which all other times of the room count: they may be absolute, of 2e9 s
-    start, step   time of the first row, 0, and between rows, s;  n_rows
+    step          time between rows, s: the first has the time 0;  n_rows
     coefficients  (degree + 1, 3), m: Chebyshev polynomials over the rows' span
     is_line       whether the positions are a straight, evenly sampled line to within the accuracy asked for, and
                   transmitter and receiver are one antenna
     """
 
-    start: float
     step: float
     n_rows: int
     coefficients: np.ndarray
@@ -71,7 +70,7 @@ class Track:
             if wavenumber * rest <= accuracy:
                 break
         fitted[0] += origin
-        track = cls(0.0, step, raw.n_rows, fitted, degree == 1 and raw.is_monostatic, float(raw.time[0]))
+        track = cls(step, raw.n_rows, fitted, degree == 1 and raw.is_monostatic, float(raw.time[0]))
         if not np.linalg.norm(track.states(np.array([track.stop / 2]))[1]) * step > 0:
             raise ValueError(f"the antenna rests at {middle[0]}; a synthetic aperture needs a moving one")
         return track
@@ -79,22 +78,22 @@ class Track:
     @property
     def times(self) -> np.ndarray:
         """Times of the rows, s (n_rows,)."""
-        return self.start + self.step * np.arange(self.n_rows)
+        return self.step * np.arange(self.n_rows)
 
     @property
     def stop(self) -> float:
         """Time of the last row, s."""
-        return self.start + self.step * (self.n_rows - 1)
+        return self.step * (self.n_rows - 1)
 
     @property
     def speed(self) -> float:
         """Speed at the middle of the track, m/s."""
-        return float(np.linalg.norm(self.states(np.array([(self.start + self.stop) / 2]))[1]))
+        return float(np.linalg.norm(self.states(np.array([self.stop / 2]))[1]))
 
     def states(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Positions, m, and velocities, m/s, (n, 3) at times, s (n,), also beyond the rows."""
-        half = (self.stop - self.start) / 2
-        x = (np.asarray(times) - self.start) / half - 1
+        half = self.stop / 2
+        x = np.asarray(times) / half - 1
         velocity = chebyshev.chebval(x, chebyshev.chebder(self.coefficients)).T / half
         return chebyshev.chebval(x, self.coefficients).T, np.broadcast_to(velocity, (len(x), 3))
 
@@ -110,7 +109,7 @@ class Track:
                 raise ValueError(f"side is {asked!r:.60}; choose 'left' or 'right' of the track, seen from above")
             return 1.0 if asked == "right" else -1.0
         off = (np.linalg.norm(raw.tx, axis=1) + np.linalg.norm(raw.rx, axis=1)) / 2 - raw.reference_range
-        position, velocity = self.states(np.array([(self.start + self.stop) / 2]))
+        position, velocity = self.states(np.array([self.stop / 2]))
         right = np.cross(velocity[0], UP)
         across = -float(position[0] @ right) / max(float(np.linalg.norm(right)), 1e-300)
         unseen = self.is_earth_fixed or bool((np.abs(off) > raw.swath / 2).any())

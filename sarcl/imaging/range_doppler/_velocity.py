@@ -95,7 +95,7 @@ def effective_speed(raw: PhaseHistory, track: Track, positions: Positions, dista
 
     Of an orbit it is 5 to 10 % below the speed of the antenna, since the ground turns below it.
     """
-    u, rows = (track.start + track.stop) / 2, np.arange(track.n_rows)
+    u, rows = track.stop / 2, np.arange(track.n_rows)
     fit = hyperbolas(raw, track, positions, u, distance, distance, rows)
     return float(fit.at(np.array([distance]))[0][0])
 

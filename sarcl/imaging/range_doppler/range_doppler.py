@@ -179,7 +179,7 @@ def gain_of(
     for k, column in enumerate(chosen):
         distance = plan.ranges[column]
         speed, _, shift = (float(v[0]) for v in plan.fit.at(np.array([distance])))
-        later = float(plan.times[0]) + shift - track.start + step * between
+        later = float(plan.times[0]) + shift + step * between
         seen = plan.band.weight(sine(later, distance, np.array(0.0), speed))
         sums[:, k] = fftconvolve(seen, rows, mode="valid")
     largest = float(sums.max())
