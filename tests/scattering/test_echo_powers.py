@@ -9,7 +9,6 @@ import sarcl
 from sarcl.base.vectors import unit
 from sarcl.numerics.pulse_geometry import PulseGeometry
 from sarcl.opencl.choose_device import open_device
-from sarcl.scattering._rough_surface import rough_mean
 from sarcl.scattering.facet_shadows import Casters, ShadowRule, echo_powers
 from sarcl.scattering.physical_optics import scattering_matrix
 from sarcl.scene.triangles import areas, centroids, normals
@@ -17,7 +16,6 @@ from sarcl.scene.triangles import areas, centroids, normals
 MATERIALS = [
     sarcl.Material(diagram="isotropic"), sarcl.Material(diagram="cos2"), sarcl.Material(diagram="exp", width=0.5),
 ]  # fmt: skip
-WAVELENGTH = 0.03  # m
 METAL = 1 - 1e12j  # relative permittivity
 
 
@@ -35,18 +33,15 @@ def powers_of(scene, antennas):
 
 
 def mean_echoes(scene, track):
-    """Means over pulses of |S|^2 A^2 |mean of exp(j q.rho)|^2 of random numbers of power 1, by facet."""
-    normal, area, total = normals(scene.triangles), areas(scene.triangles), np.zeros(len(scene.triangles))
+    """Means over pulses of |S|^2 A D/Omega, by facet: that of a rough plate is lambda^2 times this."""
+    normal, total = normals(scene.triangles), np.zeros(len(scene.triangles))
     for place in track.positions:
         look = unit(place - centroids(scene.triangles))
         side = np.where(scene.two_sided & ((normal * look).sum(axis=1) < 0), -1, 1)[:, None] * normal
-        matrix = scattering_matrix(side, look, look, np.full(len(area), METAL))[:, 0, 0]
-        q = 4 * np.pi / WAVELENGTH * look
-        for number, material in enumerate(scene.materials):
-            rows = np.flatnonzero(scene.material == number)
-            sides = q[rows], side[rows], area[rows]
-            mean = rough_mean(np.zeros(len(rows)), material, *sides, WAVELENGTH, np.ones(len(rows)))
-            total[rows] += np.abs(matrix[rows] * area[rows] * mean) ** 2
+        matrix = scattering_matrix(side, look, look, np.full(len(total), METAL))[:, 0, 0]
+        delta = np.arccos(np.clip((side * look).sum(axis=1), -1, 1))
+        lobes = np.array([material.lobe(delta) / material.solid_angle for material in scene.materials])
+        total += np.abs(matrix) ** 2 * areas(scene.triangles) * lobes[scene.material, np.arange(len(total))]
     return total / len(track.positions)
 
 
