@@ -296,7 +296,9 @@ __kernel void lit_parts(lit_parts_numbers given, __global const double *restrict
                         while (moved && s < known) {
                             moved = 0;
                             until = known;
+#if PARTS < 8  // every index is constant
 #pragma unroll
+#endif
                             for (int i = 0; i < (PARTS < 8 ? PARTS : parts); i++)
                                 if (i < parts && begins[i] <= s && stops[i] > s) {
                                     s = stops[i];

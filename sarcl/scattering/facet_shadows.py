@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -13,10 +14,12 @@ from ..base.text import size_text
 from ..numerics.pulse_geometry import PulseGeometry
 from ..opencl.device import Device
 from ..scene import triangles as geometry
+from ..scene.material import COHERENT, Material
 from ..scene.scene import Scene
 from ..scene.terrain import Heights, clear_of, is_overlooked, stand_above
 from ..visibility.illumination import Illumination, IlluminationTask, Occlusion, illuminated
 from ..visibility.lit_parts import ON_PLANE, FacetPieces, LitParts, ground_of, upper_sides
+from ..visibility.seen_lobes import mean_lobes
 from ..visibility.swept_shadows import far_slopes, never_shaded
 from .facet_kinds import coherent
 from .facet_plan import FACET_BYTES
@@ -30,6 +33,7 @@ SMALL, MANY_SMALL, FEW_SMALL = 10.0, 100, 0.01
 # Of a facet of median width, by which shadows move between pulses that they are looked at from: largest, and over the
 # accuracy of amplitudes
 FINEST = 0.25, 3.0
+DRAWN = 2**17  # facets whose echoes tell the mean power per area of more facets
 # Part of a terrain that antennas may see from below: with more, hardly any facet lies above all that may shade it
 MOST_FAR = 0.01
 
@@ -199,7 +203,7 @@ class Casters:
             Occlusion(self.far_slopes, hidden & upper, apart=True),
             Occlusion(self.floor, hidden & ~upper),
         )
-        power = pieces.reflectivity**2 * geometry.areas(pieces.triangles)
+        power = echo_powers(pieces, pieces.triangles, np.arange(len(of)), antennas)
         limits = min(FINEST[0], FINEST[1] * rule.accuracy), rule.accuracy, rule.max_bytes
         task = IlluminationTask(pieces.triangles, antennas.ends, pieces.two_sided, occlusions, power, beside, *limits)
         return illuminated(task, device, progress)
@@ -215,8 +219,12 @@ class Casters:
             # of a terrain that may hide itself, the back of no facet is certain to be seen
             two_sided = (scene.two_sided & ~self.hidden_by_floor)[of[rows]]
             is_lit[rows] = never_shaded(facets[rows], two_sided, casters, antennas.ends)
-        power = scene.reflectivity[of[is_lit]] ** 2 * geometry.areas(facets[is_lit])
-        return ~is_lit, float(power.sum())
+        lit = np.flatnonzero(is_lit)
+        drawn = lit[:: len(lit) // DRAWN + 1]
+        if not len(drawn):
+            return ~is_lit, 0.0
+        power = echo_powers(scene, facets[drawn], of[drawn], antennas).sum()
+        return ~is_lit, float(power * geometry.areas(facets[lit]).sum() / geometry.areas(facets[drawn]).sum())
 
     def _pieces_hidden_by_floor(self, pieces: Scene, of: np.ndarray, antennas: PulseGeometry) -> np.ndarray:
         """Pieces of facets `of` (k,) that the terrain may hide (k,): of a wall, those near the ground alone."""
@@ -226,6 +234,28 @@ class Casters:
             on = self.on_heights[of[rows]]
             is_hidden[rows] = ~clear_of(self.heights, pieces.triangles[rows], on, antennas.ends)
         return is_hidden
+
+
+def echo_powers(scene: Scene, facets: np.ndarray, of: np.ndarray, antennas: PulseGeometry) -> np.ndarray:
+    """Powers (k,) of the echoes of parts of a scene's facets `of` (k,), m (k, 3, 3), relative to one another: means of
+    a track. Errors of shadows on facets are in proportion to their roots.
+
+        P = |R|^2 A,   of one antenna  |R|^2 A cos(delta)^2 D(delta)/Omega,   delta from the normal to the antenna
+
+    Diagrams D and Omega as in _rough_surface.py. Between two antennas a facet that is edge-on to one of them may still
+    send an echo to the other.
+    """
+    power = scene.reflectivity[of] ** 2 * geometry.areas(facets)
+    if len(antennas.ends) == 1:
+        lobes = [partial(_lobe, material) for material in scene.materials]
+        power *= mean_lobes(facets, scene.two_sided[of], antennas.tx, lobes, scene.material[of])
+    return np.asarray(power)
+
+
+def _lobe(material: Material, cosine: np.ndarray) -> np.ndarray:
+    """Power per area that a facet sends back, by the cosine of incidence."""
+    diagram = 1.0 if material.diagram in COHERENT else material.lobe(np.arccos(cosine)) / material.solid_angle
+    return np.asarray(cosine**2 * diagram)
 
 
 def rough_looks(scene: Scene, cell: float, n_pulses: int) -> float:

@@ -46,6 +46,16 @@ def normals(triangles: np.ndarray) -> np.ndarray:
     return out
 
 
+def cosines_to(triangles: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """Cosine of the angle between the outward normal of each triangle (k, 3, 3) and the direction from its centroid to
+    a place (3,): (k,); 0 of triangles without an area."""
+    out = np.empty(len(triangles))
+    for block, (a, b, c) in _blocks(triangles):
+        n, ahead = _cross(a, b, c), place[:, None] - (a + b + c) / 3
+        out[block] = (n * ahead).sum(axis=0) / np.maximum(_length(n) * _length(ahead), 1e-300)
+    return out
+
+
 def solid(triangles: np.ndarray) -> np.ndarray:
     """True (k,) for triangles with an area that float64 resolves: at least 1e-12 of their length wide."""
     longest = np.maximum.reduce(edges(triangles))

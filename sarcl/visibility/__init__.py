@@ -5,6 +5,7 @@ For other folders:
     illumination           lit(): sampled shares of facets, per block of pulses; facet_shares(), pixel_shares()
     lit_parts              LitParts: the part of each facet that is lit at every pulse, exactly
     rays                   SceneRays: the first facet on each ray, and whether any lies between two points
+    seen_lobes             mean_lobes(): power that facets send back to an antenna along a track, by angles of incidence
     swept_shadows          never_shaded(): facets on which no shadow falls at any pulse, for certain
 
 For this folder alone:

@@ -10,9 +10,13 @@ import numpy as np
 
 from ._aspect_blocks import STRIDE
 
-# Mean square of what is left between viewpoints once the one halfway is added, over the square of the difference found
-# there: 8/15 of a parabola's mean, a half of which is left where shares begin or end to change within the half
-SETTLED = 0.45
+# Mean square of differences between two viewpoints over the square of that halfway: of parabolas, and the mean of
+# levels that begin to change anywhere between
+MEAN = 8 / 15
+# Mean square of differences halfway in the halves of an interval, over that in the interval: 1/16 of parabolas, 1/8 of
+# levels that begin to change, 1/2 of steps. The least that is taken is 1/4, of levels that begin as roots do; the most
+# is for intervals that are no halves
+LEAST_RATIO, MOST_RATIO = 0.25, 0.85
 # Of the limit: what facets may differ by, from linear changes, once they are not looked at any more
 LEFT_OUT = 0.5
 MOST = 3.0  # limits that one interval may take up, where others left so much less
@@ -63,7 +67,7 @@ def refine_viewpoints(
     strides = [np.arange(a, b, STRIDE) for a, b in pairwise(taken.tolist())]
     for place in np.concatenate([*strides, taken[-1:]])[1:].tolist():
         end = look(place, None)
-        yield from refined.between(start, levels, place, end, _Selection(None, None, 0.0), 0.0)
+        yield from refined.between(start, levels, place, end, _Selection(None, None, 0.0), 0.0, 0.0)
         start, levels = place, end
 
 
@@ -90,9 +94,12 @@ class _Refinement:
     saved: float = 0.0
 
     def between(
-        self, a: int, first: np.ndarray, b: int, last: np.ndarray, which: _Selection, left: float
+        self, a: int, first: np.ndarray, b: int, last: np.ndarray, which: _Selection, left: float, above: float
     ) -> Iterator[tuple[int, np.ndarray, float]]:
-        """Viewpoints after a, up to b, with levels `first` and `last`, between which `left` is left."""
+        """Viewpoints after a, up to b, with levels `first` and `last`, between which `left` is left.
+
+        above  mean square of differences halfway in the interval of which this is a half; 0: in none
+        """
         at = self.at
         pulses = float(at[b] - at[a])
         if b - a < 2:
@@ -105,7 +112,9 @@ class _Refinement:
         halfway, which = self._halfway(a, first, b, last, middle, part, which)
         moves = (halfway != first) | (halfway != last)
         some = np.flatnonzero(moves if which.kept is None else moves & which.kept)
-        off = SETTLED * self.squares(halfway, first, last, part, some)
+        off = self.squares(halfway, first, last, part, some)
+        found = float(off.sum()) + which.settled
+        off *= MEAN * (np.clip(found / above, LEAST_RATIO, MOST_RATIO) if above else MOST_RATIO)
         left = float(off.sum()) + which.settled
         if left <= min(self.limit() + max(self.saved, 0.0) / pulses, MOST * self.limit()):
             self.saved += (self.limit() - left) * pulses
@@ -117,8 +126,8 @@ class _Refinement:
             below = _Selection(moves, ~moves, 0.0)
         else:
             below = self._without_smallest(which.kept, which.settled, some, off)
-        yield from self.between(a, first, middle, halfway, below, left)
-        yield from self.between(middle, halfway, b, last, below, left)
+        yield from self.between(a, first, middle, halfway, below, left, found)
+        yield from self.between(middle, halfway, b, last, below, left, found)
 
     def _halfway(
         self, a: int, first: np.ndarray, b: int, last: np.ndarray, middle: int, part: float, which: _Selection
