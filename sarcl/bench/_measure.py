@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import ToleranceMissed, ToleranceUnreachable
-from . import _wait_idle
+from . import _wait_idle, exact
 from ._cases import BenchCase
 from ._competitor import Absent, Competitor, Reading
 from ._verb_cases import VerbCase
@@ -120,13 +120,10 @@ def _judge(row: Row, competitor: Competitor, case: BenchCase | VerbCase, reading
     """Record the errors of a run and what it reports."""
     if reading.errors is not None:
         row["error"], row["error_of_image"] = reading.errors
-    elif competitor.check is None:
-        assert isinstance(case, BenchCase)  # readings of other cases have their errors
-        row["error"], row["error_of_image"] = case.errors(reading.values)
     else:
-        exact, norm = competitor.check
-        wrong, own = float(np.linalg.norm(reading.values - exact)), float(np.linalg.norm(exact))
-        row["error"], row["error_of_image"] = wrong / max(own, norm), wrong / own
+        assert isinstance(case, BenchCase)  # readings of other cases have their errors
+        exact_values = competitor.check or (case.wanted, case.norm)
+        row["error"], row["error_of_image"] = exact.relative(reading.values, *exact_values)
     if not np.isfinite(row["error"]):
         raise Absent("its result holds NaN or Inf")
     row.update(reading.notes)

@@ -40,13 +40,6 @@ def backscatter(
     return np.asarray(np.abs(amplitude) ** 2 * share)
 
 
-def summed(
-    power: np.ndarray, rows: np.ndarray, columns: np.ndarray, edges: tuple[np.ndarray, np.ndarray]
-) -> np.ndarray:
-    """Sum of the powers (k,) whose coordinates lie between the edges of rows and columns, m: (n_rows, n_columns)."""
-    return np.histogram2d(rows, columns, bins=edges, weights=power)[0]
-
-
 def correlation(image: np.ndarray, power: np.ndarray, cells: int) -> float:
     """Correlation coefficient of the amplitudes of two maps of powers, averaged over squares of `cells` pixels."""
     n = [size // cells for size in image.shape]

@@ -20,7 +20,7 @@ from ...simulation.echo import echo
 from ..far_radar import ground
 from ..lab import Lab
 from ..paper import Section
-from ._maps import backscatter, correlation, cut, summed
+from ._maps import backscatter, correlation, cut
 
 AVERAGED, ALIKE = 6, 0.7  # pixels along the sides of squares; least correlation that counts as very close
 STONE = Material(eps_r=3.0, diagram="cos2")
@@ -98,9 +98,9 @@ def _maps_of_cells(
     time, slant = orbit.locate(middles)
     on_flat = [origin + np.outer(x, axis) for x, axis in zip(ground_places, (axes[1], axes[0]), strict=True)]
     edges = _edges(orbit.locate(on_flat[0])[0]), _edges(orbit.locate(on_flat[1])[1])
-    slant_map = summed(power, time, slant, edges)
+    slant_map = np.histogram2d(time, slant, bins=edges, weights=power)[0]
     along, across = ((middles - origin) @ axes[i] for i in (1, 0))
-    ground_map = summed(power, along, across, (_edges(ground_places[0]), _edges(ground_places[1])))
+    ground_map = np.histogram2d(along, across, bins=[_edges(places) for places in ground_places], weights=power)[0]
     ends = [(float(places[0]), float(places[-1])) for places in ground_places]
     for key, cells in (("on the ground", ground_map), ("in the slant plane", slant_map)):
         out.picture(f"Power of the facets in cells {key}", _db(cells), ends[1], ends[0], **LOOK)
