@@ -26,7 +26,7 @@ from ._forecast import forecast_of, is_cut
 from ._formed_samples import AnchorSearches, checked_anchors, formed_samples
 from ._fullwave_task import FullwaveTask, fullwave_task
 from ._grid_runs import GridRuns, RunProgress, run_job
-from ._model_error import check_thickness, coarse_task
+from ._model_error import FINER, RATIO, check_thickness
 from ._options import FullwaveOptions
 from ._run_bands import RunBands, RunEngine, RunRecipe
 
@@ -66,7 +66,7 @@ def fullwave_echo(scene: Scene, waveform: Waveform, track: Trajectory, options: 
     clock = Clock()
     check_subjects(scene, waveform, track)
     task = fullwave_task(scene, waveform, track, options)
-    coarse = coarse_task(task) if options.model_error else None
+    coarse = task.coarser(RATIO, FINER) if options.model_error else None
     anchors = checked_anchors(options.anchors, len(task.along))
     piece = options.piece(options.out is not None, "raw.h5")
     clock.lap("plan")
