@@ -96,7 +96,7 @@ class PointResponse:
 
         floor_db  the lowest level drawn;  title  above the picture
         """
-        from ..figures.cut_plot import curves
+        from ..figures.decibels import curves
 
         if self.cuts is None:
             raise ValueError("this PointResponse has no cuts; take one from sarcl.measure")

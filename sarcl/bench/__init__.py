@@ -23,5 +23,4 @@ For this folder alone:
     _peers         libraries in another environment, through a pipe
     _run_sarcl     sarcl as a competitor
     _verb_cases    a task of every verb, of any size
-    _wait_idle     waits until other programs leave the processors idle
 """

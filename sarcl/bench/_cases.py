@@ -54,10 +54,6 @@ class BenchCase:
         """Pulses x pixels."""
         return self.raw.n_rows * self.grid.size
 
-    def errors(self, values: np.ndarray) -> tuple[float, float]:
-        """Relative L2 error of an image's `values` at `at`: as docs/theory/accuracy.md says, and relative to |I|."""
-        return exact.relative(values, self.wanted, self.norm)
-
 
 def make(scene: str, n: int, data: str | None = None, pixels: int = 1024) -> BenchCase:
     """BenchCase `scene` of n pulses of n samples on n x n pixels, checked at `pixels` of them; seeded.

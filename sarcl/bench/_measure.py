@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from itertools import chain, zip_longest
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..base.errors import ToleranceMissed, ToleranceUnreachable
-from . import _wait_idle
+from . import exact
 from ._cases import BenchCase
 from ._competitor import Absent, Competitor, Reading
 from ._verb_cases import VerbCase
@@ -17,6 +19,8 @@ from ._verb_cases import VerbCase
 WARM = 10.0  # s; a first run counts only if it is longer, because it may build kernels, and if it checks nothing
 PROCESSES = 3  # runs of a whole process, at most
 LONG = 20.0  # s; where a call is longer, a whole process takes about as long and is not timed
+LOOK = 0.2  # s over which the idle share is measured
+ENOUGH = 0.93  # share of the processors' time that must be idle
 TELLING = 0.5  # s; the pace of a shorter call does not predict larger cases
 
 Row = dict[str, Any]
@@ -62,7 +66,7 @@ def measure(
             tick(done, total)
             if "absent" in row or _spent(row, competitor.share, repeats, limit):
                 continue
-            if not _wait_idle.wait(patience):
+            if not wait_idle(patience):
                 row["disturbed"] = row.get("disturbed", 0) + 1
             try:
                 _take(row, competitor, case, limit, paces, warm=round_ == 0)
@@ -73,7 +77,7 @@ def measure(
             done += 1
             tick(done, total)
             if "absent" not in row:
-                _wait_idle.wait(patience)
+                wait_idle(patience)
             _take_process(row, competitor)
     for row in rows:
         calls = row["seconds"].get("call", [0.0])
@@ -120,13 +124,35 @@ def _judge(row: Row, competitor: Competitor, case: BenchCase | VerbCase, reading
     """Record the errors of a run and what it reports."""
     if reading.errors is not None:
         row["error"], row["error_of_image"] = reading.errors
-    elif competitor.check is None:
-        assert isinstance(case, BenchCase)  # readings of other cases have their errors
-        row["error"], row["error_of_image"] = case.errors(reading.values)
     else:
-        exact, norm = competitor.check
-        wrong, own = float(np.linalg.norm(reading.values - exact)), float(np.linalg.norm(exact))
-        row["error"], row["error_of_image"] = wrong / max(own, norm), wrong / own
+        assert isinstance(case, BenchCase)  # readings of other cases have their errors
+        exact_values = competitor.check or (case.wanted, case.norm)
+        row["error"], row["error_of_image"] = exact.relative(reading.values, *exact_values)
     if not np.isfinite(row["error"]):
         raise Absent("its result holds NaN or Inf")
     row.update(reading.notes)
+
+
+def wait_idle(patience: float) -> bool:
+    """Wait up to `patience` s until the machine is idle; True when it is, or where the system does not say."""
+    end = time.monotonic() + patience
+    while patience > 0:
+        before = _idle_and_all()
+        if before is None:
+            return True
+        time.sleep(LOOK)
+        after = _idle_and_all()
+        if after is None or after[0] - before[0] >= ENOUGH * (after[1] - before[1]):
+            return True
+        if time.monotonic() > end:
+            return False
+    return True
+
+
+def _idle_and_all() -> tuple[int, int] | None:
+    """Clock ticks of all processors since the system started: idle, total; None where the system does not say."""
+    try:
+        ticks = [int(v) for v in Path("/proc/stat").read_text().split("\n", 1)[0].split()[1:]]
+    except (OSError, ValueError):
+        return None
+    return ticks[3] + ticks[4], sum(ticks[:8])

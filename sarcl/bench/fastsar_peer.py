@@ -5,7 +5,7 @@ image in a process of its own.
 
 Requests: {"do": "load", "folder": ...}; {"do": "run", "spec": {"former": "exact" or "factorized", "options": {...}}}
 makes a former (seconds "setup") and calls the first former made with this spec (seconds "form"; "cpu", CPU seconds
-of all processors); {"do": "stop"}.
+of all processors).
 
 Conventions found in its source (0.1.8), confirmed by the measured errors: samples f_n = fmin + n df of phase
 exp(-j 2 pi f tau), referenced to `ref`, the one-way range; pixel [i, j] at (i - nx/2) spx e1 + (j - ny/2) spy e2, so
@@ -68,7 +68,7 @@ def hello():
 
 
 def serve():
-    """Answer requests until one says stop; output of the library goes to stderr."""
+    """Answer requests until stdin ends; output of the library goes to stderr."""
     answers = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)
 
@@ -81,8 +81,6 @@ def serve():
     data = None
     for line in sys.stdin:
         request = json.loads(line)
-        if request["do"] == "stop":
-            break
         try:
             if request["do"] == "load":
                 formers.clear()

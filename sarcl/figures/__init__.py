@@ -2,7 +2,6 @@
 
 For other folders:
 
-    cut_plot   curves in decibels in one frame, with Pillow
     decibels   grey images and line plots in decibels, with Pillow
     html       a page in one file: strip of pictures, tables, figures; needs the extra `plots`
     plots      plots as PNG files, with matplotlib; needs the extra `plots`

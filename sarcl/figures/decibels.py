@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 SMALLEST, LARGEST = 500, 2400  # pixels along the longer side of what is drawn
 THINNEST = 1 / 6  # smallest ratio of shorter to longer side; a longer strip is stretched across
-CURVE = (22, 82, 148)  # colour of a line plot
+CURVES = ((22, 82, 148), (192, 57, 43), (29, 131, 72), (142, 68, 173))  # colours of line plots
 LINE_SAMPLES = 10  # samples per pixel of a line plot, at most: more are averaged
 MOST_DOTS = 64  # samples of a line plot that are shown as dots too
 PNG_NOISE, PNG_AXES = 2.2, 6e4  # bytes per pixel of noise, and of axes, caption and scale
@@ -313,6 +314,26 @@ def _line_plot(db: np.ndarray, axes: PixelAxes, scale: _Scale, title: str | None
     drawing = CurveAxes(axes.axis(db.size, 1 - along), reference, floor_db, title, caption)
     n = values.size
     relative = np.full(n, 2 * floor_db) if peak == -np.inf else values[0] - white
-    drawing.curve((np.arange(n) + 0.5) / n, relative, CURVE, has_dots=n <= MOST_DOTS)
+    drawing.curve((np.arange(n) + 0.5) / n, relative, CURVES[0], has_dots=n <= MOST_DOTS)
     drawing.image.info |= {"top_db": white, "floor_db": float(floor_db)}
+    return drawing.image
+
+
+def curves(
+    lines: Sequence[tuple[str, np.ndarray, np.ndarray]], x_name: str, floor_db: float, title: str | None, caption: str
+) -> Picture:
+    """Lines (name, x (n,), decibels (n,)) in one frame, from floor_db to a little above 0; names in the lines' colours.
+
+    ValueError for a floor_db that is not below 0.
+    """
+    if not validation.number("floor_db", floor_db) < 0:
+        raise ValueError(f"floor_db is {floor_db:g}; the frame ends that many dB below the peak: give e.g. -50")
+    first, last = (float(pick([pick(x) for _, x, _ in lines])) for pick in (np.min, np.max))
+    drawing = CurveAxes(Axis(x_name, first, last), "the peak", floor_db, title, caption)
+    for i, (name, x, db) in enumerate(lines):
+        colour = CURVES[i % len(CURVES)]
+        drawing.curve((np.asarray(x) - first) / (last - first), db, colour)
+        corner = drawing.frame[0] + drawing.unit, drawing.frame[1] + round((0.6 + 1.3 * i) * drawing.unit)
+        drawing.draw.text(corner, name, colour, drawing.font, anchor="lt")
+    drawing.image.info |= {"floor_db": float(floor_db)}
     return drawing.image

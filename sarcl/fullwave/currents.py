@@ -86,9 +86,9 @@ def currents(
     absorber   layers on each side;  gap  cells between these and the box where the wave enters
     The target is inside that box. The run ends as Decay says, or after options.most_steps.
     """
-    low, high, centre = box_of(lattice, absorber, gap)
+    low, high = box_of(lattice, absorber, gap)
     _check_inside(lattice, target, low, high)
-    table = wave_table(lattice, wave, low, high, centre)
+    table = wave_table(lattice, wave, low, high, lattice.centre)
     omega = dispersion.grid_omega(lattice, k, wave.travel)
     spectrum = table.spectrum(omega)
     _check_band(k, spectrum)
@@ -112,15 +112,15 @@ def currents(
             progress(fields.step, min(most_steps, max(expected_steps(table), fields.step + decay.missing_steps())))
     electric, magnetic = (_phasors(device, part, sum_, spectrum) for (part, _), sum_ in zip(lists, sums, strict=True))
     return Currents(
-        lattice, wave, centre, np.asarray(k), omega, fields.edges.places, electric, fields.faces.places, magnetic,
-        fields.step, decay.left, (decay.ended if fields.step >= table.n_steps else None) or "most_steps",
+        lattice, wave, lattice.centre, np.asarray(k), omega, fields.edges.places, electric, fields.faces.places,
+        magnetic, fields.step, decay.left, (decay.ended if fields.step >= table.n_steps else None) or "most_steps",
     )  # fmt: skip
 
 
-def box_of(lattice: Lattice, absorber: int, gap: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Nodes at the faces of the box where the wave enters, low and high (3,), and the middle of the grid, m (3,)."""
+def box_of(lattice: Lattice, absorber: int, gap: int) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes at the faces of the box where the wave enters, low and high (3,)."""
     low = np.full(3, absorber + gap)
-    return low, np.array(lattice.shape) - low, lattice.origin + lattice.cell * np.array(lattice.shape) / 2
+    return low, np.array(lattice.shape) - low
 
 
 def expected_steps(table: WaveTable) -> int:

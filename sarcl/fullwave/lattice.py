@@ -64,6 +64,11 @@ class Lattice:
         """Time step, s."""
         return COURANT * self.cell / SPEED_OF_LIGHT
 
+    @property
+    def centre(self) -> np.ndarray:
+        """Middle of the grid, m (3,), where phases of echoes are zero."""
+        return np.asarray(self.origin + self.cell * np.array(self.shape) / 2)
+
     def positions(self, at: np.ndarray, magnetic: bool) -> np.ndarray:
         """Positions of field components at places `at` (n,), m (n, 3)."""
         component, *node = np.unravel_index(at, (3, *self.shape))

@@ -108,11 +108,6 @@ def _whole(number: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return whole, np.maximum(number - whole, 0) * (number - whole > 1e-6)
 
 
-def centre_of(lattice: Lattice) -> np.ndarray:
-    """Centre of a grid, m (3,), where phases of echoes are zero."""
-    return np.asarray(lattice.origin + lattice.cell * np.array(lattice.shape) / 2)
-
-
 def run_bytes(
     shape: np.ndarray, edges: float, faces: float, frequencies: int, *, gap: int = GAP, absorber: int = ABSORBER,
     conductor: bool = True,
@@ -168,7 +163,7 @@ def mirror_twins(
 
     tx, sent  positions of the transmitter, m, and polarisations, unit vectors (P, 3);  k, radius  as `mirrors:twins`
     """
-    return twins(mirror_axes(lattice, target), unit(tx - centre_of(lattice)), sent, k, radius)
+    return twins(mirror_axes(lattice, target), unit(tx - lattice.centre), sent, k, radius)
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,7 +208,7 @@ def run(
 
     band  lowest and highest frequency of the waveform, Hz;  k  wavenumbers of the echoes, rad/m (F,)
     """
-    wave = PlaneWave(centre_of(lattice) - anchor.place, anchor.sent, incident_pulse(band))
+    wave = PlaneWave(lattice.centre - anchor.place, anchor.sent, incident_pulse(band))
     sources = currents(device, lattice, target, wave, k, absorber=ABSORBER, gap=GAP, options=options)
     of_pulses = antennas.tx, antennas.rx, antennas.received
     echoes = [formed_echoes(device, sources, *of_pulses, max_bytes=options.max_bytes)]

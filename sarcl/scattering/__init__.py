@@ -29,5 +29,4 @@ For this folder alone:
     _facet_norm            norms of facets at random phases, coplanar neighbours as one: the gain of cutting
     _facet_sampling        random samples of the facets or points of a scene
     _frequency_nodes       frequencies at which amplitudes are computed
-    _rough_surface         scattering diagrams of rough facets (SARAS)
 """

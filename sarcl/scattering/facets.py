@@ -223,9 +223,8 @@ class FacetSet:
 
         light  of this pulse at these frequencies: facets that are lit in part; None: every facet is seen whole
         """
-        from ._rough_surface import rough_mean
         from .added_models import put_into
-        from .physical_optics import normals_and_areas, scattering_parts, triangle_mean, turned
+        from .physical_optics import normals_and_areas, rough_mean, scattering_parts, triangle_mean, turned
 
         places = centroids(self.triangles)
         to_tx, to_rx = (unit(end - places) for end in (tx, rx))

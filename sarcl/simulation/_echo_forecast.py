@@ -24,7 +24,7 @@ from ..base.text import duration
 from ..model.phase_history import PhaseHistory
 from ..numerics import cost_model
 from ._single_channel import SingleEchoes
-from .bounces.bounce_spreader import PULSES_AT_ONCE, BounceScene, BounceSpreader
+from .bounces.bounce_spreader import PULSES_AT_ONCE, BounceSpreader
 from .echo_output import bytes_of
 from .echo_task import EchoTask
 from .edges.edge_echoes import EdgeEchoes, PreparedEdges
@@ -32,7 +32,7 @@ from .factorized.spreader import FactorizedSpreader
 from .planned_echoes import EchoWork, Method, PlannedEchoes
 from .scene_echoes import Added, SceneEchoes
 from .scene_plan import EDGES, SHADOWS, ScenePlan, parts_of, samples_shadows
-from .scene_preparation import warn_of_shapes
+from .scene_preparation import bounced_facets, warn_of_shapes
 from .spectral.spectral_task import spectral_task
 from .spreading import ChannelView
 
@@ -166,9 +166,7 @@ def _beyond_single(planned: PlannedEchoes) -> float:
         seen.antennas, seen.weights, frequencies, bandwidth, request.polarizations, request.vertical, request.gated
     )
     begin = time.perf_counter()
-    bounced = BounceScene.of(seen.scene, request.bounces, scene.error_budget, center + bandwidth / 2, request.host)
-    if bounced is not None:
-        bounced.refuse_many(seen.antennas.tx, seen.antennas.rx)
+    bounced = bounced_facets(scene)
     edges = PreparedEdges.of(request, seen)
     spreaders: list[BounceSpreader | EdgeEchoes] = [] if bounced is None else [BounceSpreader(bounced, view)]
     spreaders += [] if edges is None else [EdgeEchoes(edges, view)]

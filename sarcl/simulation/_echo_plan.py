@@ -107,7 +107,7 @@ class EchoPlan:
     def _output(self) -> EchoOutput:
         """Destination of the samples."""
         channels, options = self.channels, self.task.options
-        return EchoOutput(channels.shape, options.out, self.task.request.budget, channels.window, resumes=True)
+        return EchoOutput(channels.shape, options.out, self.task.request.budget, channels.window)
 
     def _filler(
         self, planned: PlannedEchoes, prepared: SceneEchoes, checkpoint: Checkpoint | None, clock: Clock

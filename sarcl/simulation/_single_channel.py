@@ -138,7 +138,3 @@ class SingleEchoes:
     def between(self, terms: tuple[ErrorTerm, ...]) -> tuple[ErrorTerm, ...]:
         """Error terms of the channels where their echoes have these: the same."""
         return terms
-
-    def describe(self) -> dict[str, int]:
-        """Words and numbers for a report: none."""
-        return {}

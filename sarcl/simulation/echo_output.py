@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import os
 from typing import Any
 
 import numpy as np
@@ -23,12 +22,6 @@ COPIES = 3  # of the rows' geometry, while a PhaseHistory is made of it: 320 byt
 SHARE = 0.25  # of max_bytes, for samples that are about to be written to a file
 
 
-def check_name(out: object) -> None:
-    """TypeError where `out` is no name of a file, nor None."""
-    if out is not None and not isinstance(out, (str, os.PathLike)):
-        raise TypeError(f"out is a {type(out).__name__}; give the name of a file such as 'raw.h5', or None")
-
-
 def bytes_of(shape: tuple[int, ...]) -> float:
     """Bytes of samples (n_pulses, ..., n_samples), and of the geometry of their rows."""
     return float(np.prod(shape[:-1], dtype=float)) * (8.0 * shape[-1] + ROW_BYTES)
@@ -42,20 +35,13 @@ def pulses_at_once(shape: tuple[int, ...], out: object, budget: float) -> int:
 class EchoOutput:
     """Samples (n_pulses, ..., n_samples), complex64; a row is the last axis.
 
-    out      the file they are written to, or None: memory. Its size is logged before the computation starts.
-    resumes  the run goes on from its tiles, for the message of a full disk
+    out  the file they are written to, or None: memory. Its size is logged before the computation starts.
     MemoryError gives the bytes that they would take; for a file, the errors of `output_paths.check_writable`.
     """
 
     def __init__(
-        self,
-        shape: tuple[int, ...],
-        out: PathLike | None,
-        budget: float,
-        window: tuple[float, float],
-        resumes: bool = False,
+        self, shape: tuple[int, ...], out: PathLike | None, budget: float, window: tuple[float, float]
     ) -> None:
-        check_name(out)
         self.shape, self.writer, self.whole = shape, None, np.zeros(0, np.complex64)
         self.a_pulse = int(np.prod(shape[1:-1], dtype=np.int64))
         self.pulses = pulses_at_once(shape, out, budget)
@@ -72,7 +58,7 @@ class EchoOutput:
             )
         if out is not None:
             functions = formats.writer_functions(out, "phase history")
-            self.writer = functions.EchoWriter(out, n_rows, shape[-1], resumes=resumes)
+            self.writer = functions.EchoWriter(out, n_rows, shape[-1], resumes=True)
             return
         try:
             self.whole = np.zeros(shape, np.complex64)
@@ -99,14 +85,6 @@ class EchoOutput:
         if self.writer is not None:
             rows = block.reshape(-1, self.shape[-1])
             self.writer.samples[start * self.a_pulse : start * self.a_pulse + len(rows)] = rows
-
-    def add(self, start: int, block: np.ndarray) -> None:
-        """Add to the samples of some pulses that were kept."""
-        if self.writer is None:
-            self.whole[start : start + len(block)] += block
-        else:
-            rows = slice(start * self.a_pulse, (start + len(block)) * self.a_pulse)
-            self.writer.samples[rows] = self.writer.samples[rows] + block.reshape(-1, self.shape[-1])
 
     def keep_frequencies(self, first: int, block: np.ndarray) -> None:
         """Store the samples of all pulses at some frequencies, (n_pulses, ..., n), from index `first` on."""

@@ -92,7 +92,7 @@ def _prepared(plan: ScenePlan, *, tiled: bool, exact: bool) -> SceneEchoes:
         behind = FacetsBehindSheets.of(request, seen, cut.host, subdivision.plan, plan.error_budget)
         if behind is not None:
             skipped["shadowed"] -= behind.n_dark * len(seen.antennas)
-    bounced = _bounced(plan)
+    bounced = bounced_facets(plan)
     if bounced is None and behind is None:
         _check_left(request, points, facets, skipped)
     if points is not None:
@@ -121,7 +121,7 @@ def _prepared(plan: ScenePlan, *, tiled: bool, exact: bool) -> SceneEchoes:
     return prepared
 
 
-def _bounced(plan: ScenePlan) -> BounceScene | None:
+def bounced_facets(plan: ScenePlan) -> BounceScene | None:
     """Facets of several reflections, None where only single ones are asked for. MemoryError for too many ways."""
     request, seen = plan.request, plan.seen
     highest = seen.waveform.center + seen.waveform.bandwidth / 2

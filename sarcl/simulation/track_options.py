@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -16,7 +17,6 @@ from ..base.validation import array, choice, direction, flag
 from ..model.trajectory import Trajectory
 from ..numerics.run_options import RunOptions
 from ..scattering.facets import POLARIZATIONS
-from .echo_output import check_name
 
 Polarization = Literal["HH", "HV", "VH", "VV"]
 
@@ -35,7 +35,8 @@ def polarizations(_: str, asked: object) -> tuple[str, ...]:
 
 def file_name(_: str, out: object) -> object:
     """`out`, the name of a file or None; TypeError for anything else."""
-    check_name(out)
+    if out is not None and not isinstance(out, (str, os.PathLike)):
+        raise TypeError(f"out is a {type(out).__name__}; give the name of a file such as 'raw.h5', or None")
     return out
 
 

@@ -13,7 +13,7 @@ import pytest
 import report as page
 
 import sarcl
-from sarcl.bench import _cases, _measure, _peers, _wait_idle, documents, exact, pareto, ratios, spaceborne, tables
+from sarcl.bench import _cases, _measure, _peers, documents, exact, pareto, ratios, spaceborne, tables
 from sarcl.bench import backproject as bench
 from sarcl.bench import baseline as numpy_baseline
 from sarcl.bench._competitor import Absent, Competitor, Reading
@@ -175,11 +175,11 @@ def test_competitors_take_turns_and_long_ones_fewer():
 
 def test_runs_wait_for_an_idle_machine_but_not_for_ever(monkeypatch):
     ticks = iter([(0, 100), (10, 200), (10, 200), (105, 300)])  # 10 % idle, then 95 %
-    monkeypatch.setattr(_wait_idle, "_idle_and_all", lambda: next(ticks))
-    assert _wait_idle.wait(60)
+    monkeypatch.setattr(_measure, "_idle_and_all", lambda: next(ticks))
+    assert _measure.wait_idle(60)
     busy = itertools.count(0, 100)
-    monkeypatch.setattr(_wait_idle, "_idle_and_all", lambda: (0, next(busy)))
-    assert not _wait_idle.wait(0.01)
+    monkeypatch.setattr(_measure, "_idle_and_all", lambda: (0, next(busy)))
+    assert not _measure.wait_idle(0.01)
     case = _cases.make("spotlight", 8, pixels=256)
     (row,) = _measure.measure(case, [constant(case.wanted, 0.1)], repeats=2, limit=60, paces={}, patience=0.01)
     assert row["disturbed"] == 3  # the first run too

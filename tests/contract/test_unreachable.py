@@ -340,7 +340,7 @@ MAY_CATCH = {
     "bench/fastsar_peer.py": "a process of its own: what another library raises is a line of the table",
     "bench/_peers.py": "text that is no JSON",
     "io/toml.py": "an integer with more digits than Python reads",
-    "bench/_wait_idle.py": "/proc/stat of a system that has none",
+    "bench/_measure.py": "/proc/stat of a system that has none",
     "base/arguments.py": "what numpy says of an index",
     "io/_checked_rows.py": "what h5py says of an index",
     "base/validation.py": "what numpy, float and int say of input",

@@ -148,7 +148,7 @@ def test_the_base_of_a_cone_lies_on_nodes_and_a_sphere_in_the_middle_of_its_grid
     assert np.isclose(below.origin[2] / below.cell % 1, [0, 1], atol=1e-6).any()
     ball = lattice_of(SPHERE)
     assert np.isclose(ball.cell, SPEED_OF_LIGHT / 1.5e9 / 12)
-    assert np.allclose(runs.centre_of(ball), 0, atol=ball.cell * (1 + 1e-9) * np.array([1e-6, 1e-6, 0.5]))
+    assert np.allclose(ball.centre, 0, atol=ball.cell * (1 + 1e-9) * np.array([1e-6, 1e-6, 0.5]))
 
 
 @pytest.mark.parametrize(

@@ -37,12 +37,8 @@ def grid_of(n):
     return Lattice(CELL, (n, n, -(-n // 16) * 16), np.zeros(3))
 
 
-def centre_of(grid):
-    return grid.origin + grid.cell * np.array(grid.shape) / 2
-
-
 def ball(grid, radius):
-    return conductor(grid, sphere_intervals(grid, centre_of(grid) + 0.13 * CELL, radius * CELL))
+    return conductor(grid, sphere_intervals(grid, grid.centre + 0.13 * CELL, radius * CELL))
 
 
 def wave_along(travel=(0.5, -0.3, -0.8)):
@@ -78,9 +74,9 @@ def test_samples_are_as_far_apart_as_the_highest_frequency_of_the_pulse_allows(c
 def test_sums_over_every_eighth_step_are_those_over_every_step(param):
     """Residuals of one run, summed in float64: only the frequencies that fall on each other can make a difference."""
     grid, wave = grid_of(32), wave_along()
-    low, high, centre = box_of(grid, ABSORBER, GAP)
+    low, high = box_of(grid, ABSORBER, GAP)
     fields = Fields(
-        opened(param), grid, ball(grid, 4), absorber=ABSORBER, wave=wave_table(grid, wave, low, high, centre)
+        opened(param), grid, ball(grid, 4), absorber=ABSORBER, wave=wave_table(grid, wave, low, high, grid.centre)
     )
     steps = []
     for _ in range(800 // BLOCK):
@@ -131,7 +127,7 @@ def test_cells_inside_a_conductor_may_be_left_out_bit_by_bit(param):
     grid, rng = grid_of(44), np.random.default_rng(3)
     target = ball(grid, 18)
     assert (target.resting[:, 3] - target.resting[:, 2]).sum() > 0.03 * np.prod(grid.shape)
-    node = np.stack(np.indices(grid.shape)) - (centre_of(grid) / CELL)[:, None, None, None]
+    node = np.stack(np.indices(grid.shape)) - (grid.centre / CELL)[:, None, None, None]
     e, h = rng.uniform(-1, 1, (2, 3, *grid.shape)) * (np.linalg.norm(node, axis=0) > 20)  # nothing inside
     ends = []
     for listed in (target, replace(target, resting=None)):
@@ -162,8 +158,8 @@ def test_cells_at_rest_are_left_as_they_are(param):
 @pytest.mark.parametrize("travel", [(0.5, -0.3, -0.8), (0, 0, 1), (-1, 0, 0), (0.6, 0.8, 0)])
 def test_fields_ahead_of_the_wave_are_below_rounding(param, travel):
     grid, wave = grid_of(48), wave_along(travel)
-    low, high, centre = box_of(grid, ABSORBER, GAP)
-    table = wave_table(grid, wave, low, high, centre)
+    low, high = box_of(grid, ABSORBER, GAP)
+    table = wave_table(grid, wave, low, high, grid.centre)
     target = ball(grid, 8)
     dark, full = (Fields(opened(param), grid, target, absorber=ABSORBER, wave=table, tile=t) for t in (None, 5))
     full._dark = False
@@ -234,7 +230,7 @@ def test_a_run_that_is_asked_for_more_than_float32_has_says_so(param):
 
 def open_box(grid, mouth):
     """A cube of 16 cells with walls of 2 cells, and a square mouth in one side, in cells."""
-    middle, side, wall = centre_of(grid), 16 * CELL, 2 * CELL
+    middle, side, wall = grid.centre, 16 * CELL, 2 * CELL
 
     def box(size, at):
         return shapes.box(size, position=np.subtract(at, (0, 0, size[2] / 2))).triangles

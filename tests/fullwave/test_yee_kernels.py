@@ -29,7 +29,7 @@ def wave_for(lattice, inset):
     low, high = np.full(3, inset), np.array(lattice.shape) - inset
     top = 299792458.0 / (8 * lattice.cell)
     wave = PlaneWave(np.array([0.36, -0.48, 0.8]), np.array([1.0, 2, 0]), Pulse.gaussian(0.1 * top, top))
-    return wave_table(lattice, wave, low, high, lattice.origin + lattice.cell * np.array(lattice.shape) / 2)
+    return wave_table(lattice, wave, low, high, lattice.centre)
 
 
 @pytest.mark.parametrize("shape", [(1, 1, 16), (3, 5, 16), (2, 17, 32), (9, 8, 48)])

@@ -12,6 +12,5 @@ For this folder alone:
     _closed_mesh  closed meshes in whole numbers; refusals of open meshes
     _dielectrics  permittivities of the edges of the grid in dielectric and lossy bodies
     _face_areas   how much of each face of the grid closed meshes cover
-    _least_areas  the least areas of cut faces with which the time steps are stable
     _thin_parts   parts of a mesh that are thinner than a cell: refusals, and sheets in place of narrow strips
 """

@@ -212,7 +212,7 @@ class FullwaveTask:
         senses = self.senses(rx)
         shape = len(pulses), len(received), len(self.frequencies)
         formed = [np.empty(shape, np.complex64) for _ in range(1 + (twin is not None))]
-        path = half_path(tx, rx, runs.centre_of(self.lattice)) - half_path(tx, rx, self.centre)
+        path = half_path(tx, rx, self.lattice.centre) - half_path(tx, rx, self.centre)
         steps, left, parts, shown = 0, 0.0, self.parts, 0.0
         for number, part in enumerate(parts):
 

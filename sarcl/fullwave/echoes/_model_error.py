@@ -53,11 +53,6 @@ def grid_error(task: FullwaveTask, coarse: FullwaveTask, runs: GridRuns, anchor:
     return error**2 + losses**2, float(np.linalg.norm(weighted)) ** 2
 
 
-def coarse_task(task: FullwaveTask) -> FullwaveTask:
-    """The task on larger cells."""
-    return task.coarser(RATIO, FINER)
-
-
 def check_thickness(coarse: FullwaveTask, cells: float) -> None:
     """Cut the bodies by the larger cells. TooThin, a ValueError, where these do not resolve a part.
 

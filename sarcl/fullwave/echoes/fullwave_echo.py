@@ -11,7 +11,6 @@ import numpy as np
 from ...base.errors import confirm_tolerance
 from ...base.forecast import Forecast, Plan
 from ...base.stage_timer import Clock
-from ...base.validation import instance
 from ...base.verb import verb
 from ...blocks.fill_bands import BandFiller
 from ...model.phase_history import PhaseHistory
@@ -21,11 +20,13 @@ from ...opencl.memory_budget import budget
 from ...scene.scene import Scene
 from ...simulation.echo_files import EchoFiles
 from ...simulation.echo_output import EchoOutput
+from ...simulation.echo_sampling import row_fields
+from ...simulation.echo_task import check_subjects
 from ._forecast import forecast_of, is_cut
 from ._formed_samples import AnchorSearches, checked_anchors, formed_samples
 from ._fullwave_task import FullwaveTask, fullwave_task
 from ._grid_runs import GridRuns, RunProgress, run_job
-from ._model_error import check_thickness, coarse_task
+from ._model_error import FINER, RATIO, check_thickness
 from ._options import FullwaveOptions
 from ._run_bands import RunBands, RunEngine, RunRecipe
 
@@ -63,10 +64,9 @@ def fullwave_echo(scene: Scene, waveform: Waveform, track: Trajectory, options: 
     >>> fields = sarcl.fullwave_echo(ball, low, few, tolerance=0.1)
     """
     clock = Clock()
-    for name, value, kind in (("scene", scene, Scene), ("waveform", waveform, Waveform), ("track", track, Trajectory)):
-        instance(name, value, kind)
+    check_subjects(scene, waveform, track)
     task = fullwave_task(scene, waveform, track, options)
-    coarse = coarse_task(task) if options.model_error else None
+    coarse = task.coarser(RATIO, FINER) if options.model_error else None
     anchors = checked_anchors(options.anchors, len(task.along))
     piece = options.piece(options.out is not None, "raw.h5")
     clock.lap("plan")
@@ -135,7 +135,7 @@ class FullwavePlan:
         task = self.task
         shape = len(task.tx), len(task.polarizations), len(task.frequencies)
         room = budget(task.device, task.options.max_bytes)
-        return EchoOutput(shape, task.options.out, room, task.window, resumes=True)
+        return EchoOutput(shape, task.options.out, room, task.window)
 
     def _write(self, samples: np.ndarray, output: EchoOutput) -> None:
         """Write samples, with the waveform's spectrum, to the output."""
@@ -148,22 +148,10 @@ class FullwavePlan:
     def _fields(self) -> dict[str, Any]:
         """Fields of the PhaseHistory but samples and report."""
         task = self.task
-        names = task.polarizations
-
-        def every(values: np.ndarray | None) -> np.ndarray | None:
-            return values if len(names) == 1 or values is None else np.repeat(values, len(names), axis=0)
-
-        velocities = [t.velocities for t in (task.track, task.track if task.receiver is None else task.receiver)]
         return {
             "frequency": task.frequencies[0],
             "frequency_step": task.step,
-            "tx": every(task.tx),
-            "rx": None if task.receiver is None else every(task.rx),
-            "reference_range": every(task.reference_range),
-            "time": every(task.track.times),
-            "polarization": np.tile(names, len(task.tx)),
-            "tx_velocity": every(velocities[0]),
-            "rx_velocity": every(velocities[1]),
+            **row_fields(task.track, task.receiver, task.reference_range, task.polarizations),
             "waveform": task.waveform,
             "array": None,
             "compressed": task.options.compressed,

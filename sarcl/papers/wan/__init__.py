@@ -6,7 +6,6 @@ Information Technology 26 (8), 2004, 1250-1255 (in Chinese). Numbers of figures 
 For this folder alone, a section or a group of sections of the page each, and what they share:
 
     _errata    errors in the printed equations
-    _maps      figure 7: power of the facets in cells of the ground and of the slant plane
     _orbit     figures 6 to 8: solids on rough ground, from an orbit to the image
     _patches   figures 4 and 5: patches of rising roughness or permittivity
     _radar     the radar for flat ground

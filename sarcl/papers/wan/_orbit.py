@@ -12,15 +12,17 @@ from ...imaging.range_doppler.range_doppler import range_doppler
 from ...model.image_grid import ImageGrid
 from ...model.orbit import Orbit
 from ...model.waveform import Waveform
+from ...opencl.device import DeviceChoice
+from ...scattering.facets import FacetSet
 from ...scene import shapes
 from ...scene.material import Material
 from ...scene.scene import Scene
 from ...scene.triangles import centroids
 from ...simulation.echo import echo
+from ...visibility.illumination import lit
 from ..far_radar import ground
 from ..lab import Lab
 from ..paper import Section
-from ._maps import backscatter, correlation, cut, summed
 
 AVERAGED, ALIKE = 6, 0.7  # pixels along the sides of squares; least correlation that counts as very close
 STONE = Material(eps_r=3.0, diagram="cos2")
@@ -98,9 +100,9 @@ def _maps_of_cells(
     time, slant = orbit.locate(middles)
     on_flat = [origin + np.outer(x, axis) for x, axis in zip(ground_places, (axes[1], axes[0]), strict=True)]
     edges = _edges(orbit.locate(on_flat[0])[0]), _edges(orbit.locate(on_flat[1])[1])
-    slant_map = summed(power, time, slant, edges)
+    slant_map = np.histogram2d(time, slant, bins=edges, weights=power)[0]
     along, across = ((middles - origin) @ axes[i] for i in (1, 0))
-    ground_map = summed(power, along, across, (_edges(ground_places[0]), _edges(ground_places[1])))
+    ground_map = np.histogram2d(along, across, bins=[_edges(places) for places in ground_places], weights=power)[0]
     ends = [(float(places[0]), float(places[-1])) for places in ground_places]
     for key, cells in (("on the ground", ground_map), ("in the slant plane", slant_map)):
         out.picture(f"Power of the facets in cells {key}", _db(cells), ends[1], ends[0], **LOOK)
@@ -159,3 +161,43 @@ def _shadow(out: Section, power: np.ndarray, grid: ImageGrid, tangent: float) ->
 def _db(power: np.ndarray) -> np.ndarray:
     """dB over the median pixel, which is ground: the scale that figures 6 to 8 have in common."""
     return np.asarray(10 * np.log10(np.maximum(power, 1e-9 * power.max()) / np.median(power)))
+
+
+def cut(scene: Scene, edge: float) -> Scene:
+    """The scene with triangles whose edges are at most `edge`, m: small beside the cells of a map."""
+    from trimesh.remesh import subdivide_to_size
+
+    corners = scene.triangles.reshape(-1, 3)
+    vertices, faces, origin = subdivide_to_size(
+        corners, np.arange(len(corners)).reshape(-1, 3), edge, max_iter=20, return_index=True
+    )
+    return Scene.facets(
+        vertices[faces], two_sided=scene.two_sided[origin], material=scene.material[origin], materials=scene.materials
+    )
+
+
+def backscatter(
+    scene: Scene, position: np.ndarray, up: np.ndarray, frequency: float, device: DeviceChoice | None
+) -> np.ndarray:
+    """Expected power of each facet in HH towards an antenna at `position`, m (3,), over its lit share, m^2 (k,).
+
+    up  (3,), unit vector: V lies in a plane with it;  frequency  Hz
+    """
+    k = len(scene.triangles)
+    facets = FacetSet(
+        scene.triangles, scene.reflectivity, scene.two_sided, scene.material, scene.materials, None, np.arange(k),
+        np.ones(k, np.complex64),
+    )  # fmt: skip
+    amplitude = facets.amplitudes(position, position, np.array([frequency]), ("HH",), up)[0, :, 0]
+    share = lit(scene.triangles, position[None], two_sided=scene.two_sided, device=device).fraction_at(0)
+    return np.asarray(np.abs(amplitude) ** 2 * share)
+
+
+def correlation(image: np.ndarray, power: np.ndarray, cells: int) -> float:
+    """Correlation coefficient of the amplitudes of two maps of powers, averaged over squares of `cells` pixels."""
+    n = [size // cells for size in image.shape]
+    means = [
+        np.sqrt(m[: n[0] * cells, : n[1] * cells].reshape(n[0], cells, n[1], cells).mean(axis=(1, 3))).ravel()
+        for m in (image, power)
+    ]
+    return float(np.corrcoef(*means)[0, 1])

@@ -119,7 +119,7 @@ class SpectralEchoPlan:
 
     def _output(self) -> EchoOutput:
         """Destination of the samples."""
-        return EchoOutput(self.shape, self.options.out, self.task.request.budget, self.task.window, resumes=True)
+        return EchoOutput(self.shape, self.options.out, self.task.request.budget, self.task.window)
 
     def _filler(self, planned: PlannedParts, job: BlockJob, checkpoint: Checkpoint | None, clock: Clock) -> BandFiller:
         """What fills the spectra, by the devices of the task."""
