@@ -23,7 +23,7 @@ class Forecast(NotebookTable, Generic[R_co]):
     plan             details of the plan, as in a report
     seconds          estimated run time at the present speed of the devices
     bytes            estimated memory: of an image all pixels, and the blocks on every device; of echoes their samples
-                     and geometry, in memory or in a file
+                     and geometry, in memory or in a file; of cross sections the peak of the run, with edges a bound
     predicted_error  bound of the relative error; nan: known only after the run
     error_terms      parts of predicted_error, which is the root of the sum of their squares
     n_rows, n_samples  of echoes; None for images

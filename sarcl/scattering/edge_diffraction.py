@@ -44,7 +44,9 @@ from .physical_optics import UP, polarisation
 NEAR = (
     0.1  # rad, to a pole that all currents and those of physical optics share: their difference is a series, to 1e-12
 )
-LEAST_ANGLE = 1e-7  # rad, of alpha from 0 and pi: sin(alpha/N)/sin(alpha) has a limit at 0
+LEAST_ANGLE = 1e-7  # rad, of alpha from 0: sin(alpha/N)/sin(alpha) has a limit at 0
+LEAST_GRAZING = 1e-12  # rad, of alpha from pi: 1/sin(alpha) of an antenna beside the face times the field along it
+IN_PLANE = 1e-14  # of n.u: a transmitter in the plane of a sheet is the mean of one above and one below
 LEAST_SINE = 1e-4  # of beta': a wave along the edge is taken at this angle from it
 
 
@@ -115,13 +117,19 @@ class _StripResponse:
         """shares  of all currents, and of those of physical optics, in the sum"""
         t, n, outside = wedge.tangent, wedge.normal, np.pi * wedge.number
         other = np.cos(outside)[..., None] * wedge.inward + np.sin(outside)[..., None] * n  # x_2
-        angle = np.arctan2(_dot(n, to_tx), _dot(wedge.inward, to_tx)) % (2 * np.pi)
+        above = _dot(n, to_tx)
+        angle = np.arctan2(above, _dot(wedge.inward, to_tx)) % (2 * np.pi)
+        in_plane = (np.abs(above) < IN_PLANE) & (wedge.number == 2)
         is_outside, faces = angle <= outside, []
         for x, along, phi in ((wedge.inward, t, angle), (other, -t, outside - angle)):
             cosine = -_dot(to_tx, along)
             sine = np.maximum(np.sqrt(np.maximum(1 - cosine**2, 0)), LEAST_SINE)
             mu = (_dot(to_rx, x) + cosine / sine * (_dot(to_rx, along) - cosine)) / sine
-            factors = _factors(np.clip(phi, 0, outside), mu, cosine, sine, wedge.number, shares)
+            strip = sine[..., None] * x + cosine[..., None] * along
+            beside = np.linalg.norm(strip - to_rx, axis=-1) / sine  # 1 - mu = beside^2/2, to the last digit
+            sides = np.clip([phi, outside - phi] if in_plane.any() else [phi], 0, outside)
+            each = [_factors(side, (mu, beside), cosine, sine, wedge.number, shares) for side in sides]
+            factors = [np.where(in_plane, (one + other) / 2, one) for one, other in zip(each[0], each[-1], strict=True)]
             faces.append((x, along, tuple(np.where(is_outside, one, 0) for one in factors)))
         return cls(tuple(faces))
 
@@ -135,14 +143,26 @@ class _StripResponse:
 
 
 def _factors(
-    phi: np.ndarray, mu: np.ndarray, cosine: np.ndarray, sine: np.ndarray, number: np.ndarray, shares: tuple[int, int]
+    phi: np.ndarray,
+    look: tuple[np.ndarray, np.ndarray],
+    cosine: np.ndarray,
+    sine: np.ndarray,
+    number: np.ndarray,
+    shares: tuple[int, int],
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """What multiplies H_t in K_x, and H_t and E_t in K_t, complex128 (...), of one face."""
+    """What multiplies H_t in K_x, and H_t and E_t in K_t, complex128 (...), of one face.
+
+    look    mu, and the root of 2 (1 - mu), for receivers so near to the strip that mu has no digits for them
+    shares  of all currents, and of those of physical optics
+    """
+    mu, beside = look
     alpha = np.arccos(-mu - 0j)  # from below the cut: a wave along the strip decays
-    alpha = np.where(np.abs(np.sin(alpha)) < LEAST_ANGLE, alpha - LEAST_ANGLE, alpha)
+    alpha = np.where(np.abs(alpha) < LEAST_ANGLE, alpha - LEAST_ANGLE, alpha)
+    grazing = np.where(mu > 0, 2 * np.arcsin(np.clip(beside / 2, LEAST_GRAZING / 2, 1)), np.pi - alpha)
+    alpha = np.pi - grazing
     every, lit = shares[0], shares[1] * (phi < np.pi)
     one, two = (_poles(angle, number, every, lit) for angle in (alpha - phi, alpha + phi))
-    x_h = 1j / (sine * np.sin(alpha)) * (one + two)
+    x_h = 1j / (sine * np.sin(grazing)) * (one + two)  # sin(alpha)
     t_h = -1j * cosine * (2 * (every / number + lit) + 1j * mu * sine * x_h) / sine**2
     return x_h, t_h, 1j * (one - two) / sine**2
 

@@ -231,9 +231,9 @@ class SceneEchoes:
     def check_seen(self, counts: Counts, near: float, far: float) -> None:
         """NothingSeen where nothing at all was added within the range window from near to far, m."""
         counts = replace(counts, pairs=counts.pairs - counts.unseen - counts.weak, unseen=0, weak=0)
-        if counts.outside_window == counts.pairs:
+        if 0 < counts.outside_window == counts.pairs:
             raise NothingSeen(OUTSIDE_WINDOW.format(near, far))
-        if counts.outside_window + counts.outside_beam == counts.pairs:
+        if 0 < counts.outside_window + counts.outside_beam == counts.pairs:
             raise NothingSeen(OUTSIDE_BEAM)
         if not counts.contributing:
             raise NothingSeen(

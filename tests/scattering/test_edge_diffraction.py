@@ -171,3 +171,17 @@ def test_half_planes_scatter_half_of_a_wave_that_meets_them_edge_on():
     current = line / (-(K / 4) * np.sqrt(2j / (np.pi * K))) * K
     assert got[1, 1] == pytest.approx(current / (2 * np.sqrt(np.pi)), rel=1e-6)
     assert abs(got[0, 0]) < 1e-9
+
+
+@pytest.mark.parametrize("angle", [1e-5, 1e-7, 1e-9, 1e-10])
+def test_the_far_border_of_a_sheet_is_as_bright_however_near_the_plane_it_is_seen(angle):
+    """The fringe of the border behind, E across it, goes to 2: 1/sin(alpha) grows as e_r.x falls."""
+    got = edge_matrix(wedge(2.0), at(angle), at(angle), (0, 0, 1))  # H across the edge
+    assert abs(got[0, 0]) == pytest.approx(1 / np.sqrt(np.pi), rel=1e-5)
+
+
+@pytest.mark.parametrize(("inward", "cosine"), [(X, 0.3), (-X, 0.3), (X, -0.6)])
+def test_in_the_plane_of_a_sheet_nothing_is_turned_into_the_other_polarisation(inward, cosine):
+    """The plane is a mirror, of which one of H and V is odd and the other even."""
+    got = edge_matrix(WedgeShape(inward, Y, np.array(2.0)), at(0.0, cosine), at(0.0, cosine), (0, 1, 0))
+    assert abs(got[0, 1]) < 1e-12

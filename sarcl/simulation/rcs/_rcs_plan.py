@@ -38,6 +38,9 @@ JUDGED_FROM = 1e4  # distance from which flat facets are judged, over the scene'
 JUDGED_BAND = 1e-6  # smallest relative bandwidth at which flat facets are judged: that of one frequency
 # s on one core, per facet and direction, per frequency of these, per point and frequency, per direction (2026-11-27)
 PER_LOOK, PER_FACET, PER_POINT, PER_DIRECTION = 7e-7, 3e-7, 5e-8, 7e-4
+# bytes of a call, per facet (what directions see of it, and how well flat facets stand for a curved surface), per point
+# and frequency: peaks of allocations, 2026-11-28
+PER_CALL, FACET_BYTES, POINT_BYTES = 16e3, 6000.0, 28.0
 SHADOWS = 7.0  # per facet and direction, over that: lit parts of a car of 792 facets (2026-11-27)
 
 
@@ -79,11 +82,19 @@ class RcsPlan:
             "direct",
             {"directions": n, "frequencies": m, "facets": facets, "points": points},
             n * (PER_DIRECTION + facets * (looks + PER_FACET * m) + PER_POINT * points * m) + seconds_beyond(task),
-            16.0 * n * m * len(task.polarizations) + 2 * AT_ONCE,
+            self._bytes(),
             root_sum_square(self.error_terms),
             self.run,
             self.error_terms,
         )
+
+    def _bytes(self) -> float:
+        """Memory of the result, and of what is held at once beside it."""
+        task, scene, n = self.task, self.task.scene, len(self.task.to_tx)
+        amplitudes = 16.0 * len(task.frequencies) * len(task.polarizations)
+        held = min(AT_ONCE, amplitudes * len(scene.triangles)) + (2 * AT_ONCE if task.options.edges else 0)
+        points = POINT_BYTES * len(scene.positions) * len(task.frequencies)
+        return n * amplitudes + PER_CALL + FACET_BYTES * len(scene.triangles) + points + held
 
     def run(self) -> np.ndarray:
         """Amplitudes, m, of the task's shape."""

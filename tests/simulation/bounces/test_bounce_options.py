@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import sarcl
-from sarcl.base.errors import NotApplicable
+from sarcl.base.errors import NotApplicable, NothingSeen
 from sarcl.simulation.echo_check import worth_checking
 
 CHIRP = sarcl.Waveform.chirp(center=9.6e9, bandwidth=50e6, duration=1e-6)
@@ -170,3 +170,9 @@ def test_weak_reflections_are_left_out_and_counted():
     assert fine.report.contributions_skipped["weak reflections"] == 0
     assert two.report.contributions_skipped["weak reflections"] == 0
     assert np.linalg.norm(coarse.samples - fine.samples) <= 1e-2 * np.linalg.norm(fine.samples)
+
+
+def test_facets_that_all_face_away_are_named_as_such():
+    away = sarcl.Scene.facets(CORNER[:, ::-1], two_sided=False)
+    with pytest.raises(NothingSeen, match="away"):
+        echo(away)
