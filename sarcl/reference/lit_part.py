@@ -8,17 +8,21 @@ from ..base.vectors import unit
 from ..scattering.physical_optics import triangle_mean
 
 
-def shadow(facet: np.ndarray, occluder: np.ndarray, antenna: np.ndarray, on_plane: float) -> np.ndarray:
+def shadow(
+    facet: np.ndarray, occluder: np.ndarray, antenna: np.ndarray, on_plane: float, axes: np.ndarray | None = None
+) -> np.ndarray:
     """Shadow of an occluder, m (3, 3), on the plane of a facet, m (3, 3), about its centroid: corners (n, 2), n 0 to 5.
 
-    on_plane  m: corners nearer to the plane lie in it
+    on_plane  m: corners nearer to the plane lie in it;  axes  plane_axes(facet), where these are known
     """
-    axes, center = plane_axes(facet), facet.mean(axis=0)
+    axes, center = plane_axes(facet) if axes is None else axes, facet.mean(axis=0)
     eye = (antenna - center) @ axes.T
     solid = (occluder - center) @ axes.T
     solid[:, 2] *= np.sign(eye[2])
     solid[np.abs(solid[:, 2]) <= on_plane, 2] = 0
     height = abs(eye[2])
+    if solid[:, 2].max() <= 0:
+        return np.zeros((0, 2))
     for limit, sign in ((0.0, 1), (0.999999 * height, -1)):
         rest = []
         for a, b in zip(solid, np.roll(solid, -1, axis=0), strict=True):
@@ -28,7 +32,7 @@ def shadow(facet: np.ndarray, occluder: np.ndarray, antenna: np.ndarray, on_plan
             if above * next_above < 0:
                 rest.append(a + above / (above - next_above) * (b - a))
         solid = np.array(rest).reshape(-1, 3)
-    if len(solid) < 3 or solid[:, 2].max() <= 0:
+    if len(solid) < 3:
         return np.zeros((0, 2))
     flat = solid[:, :2] + (solid[:, :2] - eye[:2]) * (solid[:, 2] / (height - solid[:, 2]))[:, None]
     return flat[::-1] if area(flat) < 0 else flat
@@ -54,9 +58,12 @@ def lit_pieces(facet: np.ndarray, shadows: list[np.ndarray]) -> list[np.ndarray]
 def cut_away(pieces: list[np.ndarray], shadows: list[np.ndarray]) -> list[np.ndarray]:
     """Convex polygons (n, 2) less shadows: each shadow cut off edge by edge."""
     for corners in shadows:
-        left = []
+        left, sides, low, high = [], _edges(corners), corners.min(axis=0), corners.max(axis=0)
         for piece in pieces:
-            for a, b in _edges(corners):
+            if (piece.max(axis=0) < low).any() or (piece.min(axis=0) > high).any():
+                left.append(piece)
+                continue
+            for a, b in sides:
                 outside, piece = _halves(piece, a, b)
                 if len(outside) > 2:
                     left.append(outside)
@@ -129,13 +136,14 @@ def lit_part(
     An antenna that is edge-on to the facet, or behind the side that both look at, casts no shadow. Of forward scatter,
     `others`, bool (k,), are occluders of other bodies: these alone cast shadows from the second antenna, which looks at
     the facet from any side. `window`, m: only the part with (u_t + u_r).rho between these counts."""
-    up = plane_axes(facet)[2]
+    axes = plane_axes(facet)
+    up = axes[2]
     sines = [float(unit(antenna - facet.mean(axis=0)) @ up) for antenna in antennas]
     side = -1.0 if sum(sines) < 0 else 1.0
     forward = others is not None and len(antennas) == 2
     casters = [occluders, occluders[others] if forward else occluders]
     shadows = [
-        shadow(facet, other, antenna, on_plane)
+        shadow(facet, other, antenna, on_plane, axes)
         for antenna, sine, solid in zip(antennas, sines, casters[: len(antennas)], strict=True)
         if (abs(sine) if forward else side * sine) > 1e-6
         for other in solid
@@ -143,7 +151,7 @@ def lit_part(
     pieces = lit_pieces(facet, [s for s in shadows if len(s) and area(s) > 0])
     center = facet.mean(axis=0)
     sights = [unit(antenna - center) for antenna in antennas]
-    both = plane_axes(facet)[:2] @ (2 * sights[0] if len(sights) == 1 else sights[0] + sights[1])
+    both = axes[:2] @ (2 * sights[0] if len(sights) == 1 else sights[0] + sights[1])
     total = float(np.linalg.norm(np.cross(facet[1] - facet[0], facet[2] - facet[0]))) / 2
     share, mean = 0.0, np.zeros(len(waves), np.complex128)
     for piece in pieces:

@@ -248,18 +248,34 @@ class _Seen:
         """S I of the pieces with linear phase, about their centroids, complex128 (n, n polarisations), and the same as
         sums over their parts; k  rad/m (n,)."""
 
-        def integrals(triangles: np.ndarray, q: np.ndarray, path: np.ndarray) -> np.ndarray:
-            return np.asarray((triangle_integral(triangles, k[:, None] * q) * np.exp(-1j * k * path))[:, None])
+        matrices, q, path = self._columns
+        values = self._integrals(k, q, path)[..., None]
+        if self.lit is None:
+            return matrices[0] * values[0], np.asarray((matrices[1:] * values[1:]).sum(axis=0))
+        lit = np.stack(self.lit)[..., None]
+        finer = (lit * matrices[1:] * values[1:]).sum(axis=0)
+        partly, echo = ~lit.all(axis=0), values[0]
+        if partly.any():  # the linear phase of the piece, over its parts that are lit
+            places = centroids(self._triangles).reshape(q.shape)
+            linear = self._integrals(k, np.broadcast_to(q[0], q.shape), -(q[0] * (places - places[0])).sum(axis=-1))
+            echo = np.where(partly, (lit * linear[1:, :, None]).sum(axis=0), echo)
+        return matrices[0] * echo, finer
 
-        (pieces, matrix, q, path), *parts = self.parts
-        lit = [np.ones(len(k), bool)] * len(parts) if self.lit is None else self.lit
-        echo = integrals(pieces, q, path)
-        partly, linear, finer = ~np.all(lit, axis=0), np.zeros_like(echo), np.zeros_like(matrix)
-        for (part, exact, *way), is_lit in zip(parts, lit, strict=True):
-            finer += is_lit[:, None] * exact * integrals(part, *way)
-            if partly.any():  # the linear phase of the piece, over its parts that are lit
-                linear += is_lit[:, None] * integrals(part, q, -(q * (centroids(part) - centroids(pieces))).sum(axis=1))
-        return matrix * np.where(partly[:, None], linear, echo), finer
+    @cached_property
+    def _triangles(self) -> np.ndarray:
+        """Pieces and parts in one array: where pieces are few, a call of NumPy for each takes ten times as long."""
+        return np.concatenate([triangles for triangles, *_ in self.parts])
+
+    @cached_property
+    def _columns(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """S, u_t + u_r and the paths of pieces and parts: (1 + n parts, n, ...)."""
+        matrices, q, path = (np.stack(column) for column in list(zip(*self.parts, strict=True))[1:])
+        return matrices, q, path
+
+    def _integrals(self, k: np.ndarray, q: np.ndarray, path: np.ndarray) -> np.ndarray:
+        """I of pieces and parts, with the phases of `path`, complex128 (1 + n parts, n)."""
+        integrals = triangle_integral(self._triangles, (k[:, None] * q).reshape(-1, 3)).reshape(path.shape)
+        return np.asarray(integrals * np.exp(-1j * k * path))
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import trimesh
-from helpers.cases import thinned
+from helpers.cases import quick_of, thinned
 from scipy.spatial import ConvexHull
 
 import sarcl
@@ -114,7 +114,7 @@ def test_a_cuboids_shadow_on_the_ground_is_height_times_tangent_of_look(look):
     assert dark == pytest.approx(4 + height * np.tan(np.deg2rad(look)), abs=0.02)  # 4 m lie under it
 
 
-@pytest.mark.parametrize("lines", [16, 64, 256])
+@pytest.mark.parametrize("lines", quick_of([16, 256], [16, 64, 256]))
 def test_a_large_facet_half_in_shadow_returns_its_lit_share(lines):
     random = np.random.default_rng(4)
     errors = []
@@ -421,8 +421,7 @@ def crossed_by_edges(pulses, n, seed, width):
     return np.rint(255 * np.sqrt(np.where(random.random(n) < 0.5, share, 1 - share))).astype(np.uint8)
 
 
-@pytest.mark.parametrize("width", [2, 12, 60])
-@pytest.mark.parametrize("limit", [1e-4, 1e-5])
+@pytest.mark.parametrize("width, limit", thinned([2, 60, 12], [1e-4, 1e-5]))
 def test_facets_that_change_evenly_are_left_out_within_the_limit(width, limit):
     levels = crossed_by_edges(257, 30_000, 1, width)
     found, whole, seen = refined(levels, np.arange(257), limit)
