@@ -211,7 +211,7 @@ def test_numbers_of_cells_are_estimated_from_a_sample(n, flat):
 
 @pytest.mark.costly
 def test_profiles_are_moved_and_interpolated_between_pulses_as_by_the_twin(device):
-    scene, positions = cloud(), line(120)
+    scene, positions = cloud(), line(48, aperture=80.0)
     raw = factorized_echo(scene, positions, 1e-2, device=device)
     antennas = PulseGeometry.sampled(
         raw.tx, raw.tx, raw.reference_range, first=raw.frequency[0], step=raw.frequency_step[0],
@@ -233,9 +233,9 @@ def test_profiles_are_moved_and_interpolated_between_pulses_as_by_the_twin(devic
     for at in random.uniform(-root.reach / 3, root.reach / 3, 3):
         smooth += (np.sinc((grid - at) / 3) * np.hanning(root.stride)).astype(np.complex64)
     smooth *= np.exp(2j * np.pi * random.random(shape[:2]))[..., None].astype(np.complex64)
-    rows = ascent.rows(device.upload(smooth), (0, shape[0]), range(120))
+    rows = ascent.rows(device.upload(smooth), (0, shape[0]), range(48))
     length, kernel = plan.leaf.length, plan.leaf.interpolator
-    got = SpreadSamples(device, raw.n_samples, kernel, length).of(rows, 1, 120)
+    got = SpreadSamples(device, raw.n_samples, kernel, length).of(rows, 1, 48)
     k = np.arange(raw.n_samples) - raw.n_samples // 2
     got = got * kernel.transform(k / length)  # the twin's profiles are not deconvolved
     sigma = 2 * raw.frequency_step[0] * length / SPEED_OF_LIGHT

@@ -72,7 +72,7 @@ def test_squint_needs_nothing_else(device):
     [
         (sarcl.Antenna.gaussian(width=(0.01, 0.1)), None),
         (sarcl.Antenna.rectangular(size=(2.0, 0.2)), sarcl.Radar(power=1e3)),
-        (sarcl.Antenna.rectangular(size=(4.0, 0.5), taper=0.1, two_way=True), None),
+        pytest.param(sarcl.Antenna.rectangular(size=(4.0, 0.5), taper=0.1, two_way=True), None, marks=pytest.mark.slow),
     ],
 )
 def test_antennas_weigh_points_by_aspect_and_frequency(antenna, radar, device):
@@ -88,8 +88,8 @@ def test_antennas_weigh_points_by_aspect_and_frequency(antenna, radar, device):
 
 @pytest.mark.parametrize("material", ["metal", sarcl.Material(eps_r=4.0, conductivity=1e-3, diagram="cos2")])
 def test_facets_change_along_the_track_as_echo_computes_them(material, device):
-    axis = np.linspace(-6, 6, 13)
-    heights = np.random.default_rng(1).normal(size=(13, 13)) * 0.02
+    axis = np.linspace(-3, 3, 7)
+    heights = np.random.default_rng(1).normal(size=(7, 7)) * 0.02
     scene = sarcl.Scene.from_heights(8e3 + axis, axis, heights, material=material)
     scene = scene + sarcl.Scene.points([(8e3, 3, 5.0)], [30.0])
     track = TRACK.picked(slice(100, 140))
@@ -123,14 +123,30 @@ def box_on_rough_ground():
     return ground + sarcl.shapes.box((2, 2, 3)).on(ground, 8e3, 0)
 
 
-def test_shadows_that_move_along_the_track(device):
-    scene = box_on_rough_ground()
-    track = sarcl.Trajectory.line(start=(0, -400, 6e3), velocity=(0, 100, 0), prf=80, n_pulses=640)
-    low = sarcl.Waveform.chirp(center=1e9, bandwidth=150e6, duration=2e-6)
-    raw = sarcl.spectral_echo(scene, low, track, tolerance=3e-2, device=device, check=True)
+GROUND_TRACK = sarcl.Trajectory.line(start=(0, -400, 6e3), velocity=(0, 100, 0), prf=80, n_pulses=640)
+GROUND_CHIRP = sarcl.Waveform.chirp(center=1e9, bandwidth=150e6, duration=2e-6)
+
+
+@pytest.fixture(scope="module")
+def unshadowed(device):
+    """A box on rough ground, of which every facet is seen whole."""
+    options = {"tolerance": 3e-2, "shadows": False, "device": device}
+    return sarcl.spectral_echo(box_on_rough_ground(), GROUND_CHIRP, GROUND_TRACK, **options)
+
+
+def test_shadows_that_move_along_the_track(device, unshadowed):
+    options = {"tolerance": 3e-2, "device": device, "check": True}
+    raw = sarcl.spectral_echo(box_on_rough_ground(), GROUND_CHIRP, GROUND_TRACK, **options)
     assert raw.report.measured_error <= raw.report.predicted_error <= 3e-2
-    without = sarcl.spectral_echo(scene, low, track, tolerance=3e-2, shadows=False, device=device)
-    assert np.linalg.norm(raw.samples - without.samples) > 0.1 * np.linalg.norm(raw.samples)
+    assert np.linalg.norm(raw.samples - unshadowed.samples) > 0.1 * np.linalg.norm(raw.samples)
+
+
+def test_a_box_on_rough_ground_adds_up_in_phase_and_so_do_its_errors(device, unshadowed):
+    """Averaged over both, the rough ground hid them: 11 % where 2 % were predicted."""
+    options = {"tolerance": 1e-3, "shadows": False, "device": device}
+    wanted = sarcl.echo(box_on_rough_ground(), GROUND_CHIRP, GROUND_TRACK, **options).samples
+    error = np.linalg.norm(unshadowed.samples - wanted)
+    assert error <= unshadowed.report.predicted_error * np.linalg.norm(wanted)
 
 
 def test_blocks_of_memory_change_nothing(device, tmp_path):
@@ -230,13 +246,3 @@ def test_the_forecast_of_echo_says_what_this_would_take(device):
     circle = sarcl.Trajectory.circle(radius=8e3, height=6e3, arc=0.01, n_pulses=100)
     refused = sarcl.plan(sarcl.echo, points(ground=0), CHIRP, circle, **options)
     assert "are not straight" in refused.plan["spectral_echo"]
-
-
-def test_a_box_on_rough_ground_adds_up_in_phase_and_so_do_its_errors():
-    """Averaged over both, the rough ground hid them: 11 % where 2 % were predicted."""
-    scene = box_on_rough_ground()
-    track = sarcl.Trajectory.line(start=(0, -400, 6e3), velocity=(0, 100, 0), prf=80, n_pulses=640)
-    low = sarcl.Waveform.chirp(center=1e9, bandwidth=150e6, duration=2e-6)
-    raw = sarcl.spectral_echo(scene, low, track, tolerance=3e-2, shadows=False)
-    wanted = sarcl.echo(scene, low, track, tolerance=1e-3, shadows=False).samples
-    assert np.linalg.norm(raw.samples - wanted) <= raw.report.predicted_error * np.linalg.norm(wanted)

@@ -14,6 +14,7 @@ import time
 import numpy as np
 import pytest
 from helpers.array_cases import line
+from helpers.cases import quick_of
 
 import sarcl
 from sarcl import shapes
@@ -81,7 +82,7 @@ def assert_equal(ones, others):
 
 @pytest.mark.filterwarnings("ignore:point_roughness moves posts")
 @pytest.mark.filterwarnings("ignore:bistatic angles reach")
-@pytest.mark.parametrize("task", TASKS)
+@pytest.mark.parametrize("task", quick_of(set(TASKS) - {"rough terrain"}, TASKS))  # "mixed" has that terrain too
 def test_a_list_has_the_bits_of_single_calls(task):
     scene, tracks, options = TASKS[task]
     options = {"tolerance": 1e-2, "check": False} | options
@@ -89,7 +90,7 @@ def test_a_list_has_the_bits_of_single_calls(task):
     assert_equal(sarcl.echo(scene, CHIRP, tracks, **options), alone)
     # in another order, and after a call with another band and polarisation
     other = sarcl.Waveform.chirp(center=5e9, bandwidth=50e6, duration=1e-6)
-    sarcl.echo(scene, other, tracks[0], polarization="VV", tolerance=1e-3)
+    sarcl.echo(scene, other, tracks[0], polarization="VV", tolerance=1e-2)
     back = options | ({"receiver": options["receiver"][::-1]} if "receiver" in options else {})
     assert_equal(sarcl.echo(scene, CHIRP, tracks[::-1], **back), alone[::-1])
 
