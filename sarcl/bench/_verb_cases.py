@@ -139,12 +139,14 @@ def cross_section(name: str, n: int) -> VerbCase:
     def call(*, check: bool, **options: Any) -> np.ndarray:
         return verbs.rcs(box, azimuth, elevation, CENTER, edges=True, **options)
 
-    def compare(s: np.ndarray) -> Errors:
+    @functools.cache
+    def wanted() -> np.ndarray:
         from ..scene.facing_borders import facing_borders  # imports scipy
         from ..scene.wedges import wedges
 
-        wanted = np.zeros(CHECKED, complex)
+        exact_sums = np.zeros(CHECKED, complex)
         edges = wedges(box.triangles, box.two_sided, 0.35)
+        facing = list(facing_borders(box.triangles, edges))
         for i, a in enumerate(azimuth[checked]):
             look = np.array([np.cos(elevation) * np.cos(a), np.cos(elevation) * np.sin(a), np.sin(elevation)])
             facets = box.triangles[normals(box.triangles) @ look > 0]
@@ -154,10 +156,13 @@ def cross_section(name: str, n: int) -> VerbCase:
             far, f = 1e7 * look, np.array([CENTER])
             for ends, *frame in zip(edges.ends, edges.inward, edges.normal, edges.number, strict=True):
                 parts = np.append(parts, edge_echo(ends, tuple(frame), f, (far, far), 1e7)[0, 0, 0])
-            for borders, shape in facing_borders(box.triangles, edges):
+            for borders, shape in facing:
                 parts = np.append(parts, border_echo(borders, shape, f, (far, far), 1e7)[0, 0, 0])
-            wanted[i] = parts.sum()
-        return exact.relative(s[checked], wanted, 0.0)
+            exact_sums[i] = parts.sum()
+        return exact_sums
+
+    def compare(s: np.ndarray) -> Errors:
+        return exact.relative(s[checked], wanted(), 0.0)
 
     return VerbCase(name, n, 360 * len(box.triangles), call, compare)
 

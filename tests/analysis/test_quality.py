@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from helpers.cases import quick_of
 
 import sarcl
 from sarcl.base.constants import SPEED_OF_LIGHT
@@ -43,21 +44,24 @@ class Pass:
         return sum(np.linalg.norm(x - end[:, None], axis=-1) for end in (self.tx, self.rx))
 
     def value(self, points):
-        """sum_p w_p sum_n w_n a exp(j 2 pi f_n (tau - tau_0)) (n,) of {place: a}, by Horner's rule."""
+        """sum_p w_p sum_n w_n a exp(j 2 pi f_n (tau - tau_0)) (n,) of {place: a}, by Horner's rule, 16 terms a step."""
         step = self.bandwidth / N
         first = self.frequency - self.bandwidth / 2 + step / 2
 
-        def image(x):
+        def part(x):
             out = np.zeros(len(x), np.complex128)
             for place, amplitude in points.items():
                 delay = (self.path(x) - self.path(np.array([place]))) / SPEED_OF_LIGHT
-                turn, total = np.exp(2j * np.pi * step * delay), np.zeros(delay.shape, np.complex128)
-                for w in self.weights[::-1]:
-                    total = total * turn + w
+                powers = np.ones((17, *delay.shape), np.complex128)
+                powers[1:] = np.exp(2j * np.pi * step * delay)
+                powers = np.cumprod(powers, axis=0)
+                total = np.zeros(delay.shape, np.complex128)
+                for terms in self.weights.reshape(-1, 16)[::-1]:
+                    total = total * powers[16] + np.tensordot(terms, powers[:16], 1)
                 out += amplitude * (self.weights @ (np.exp(2j * np.pi * first * delay) * total))
             return out
 
-        return image
+        return lambda x: np.concatenate([part(x[i : i + 64]) for i in range(0, len(x), 64)])  # that a cache holds
 
     def grid(self, center, plane="ground", turned=0, shape=80, oversample=1.5):
         """A grid whose columns run `turned` degrees from range, its centre between pixels of `center`."""
@@ -226,7 +230,7 @@ def test_cuts_in_all_directions_through_random_places_are_interpolated_to_1e_4()
     assert min(np.ptp(rows), np.ptp(columns)) > 25  # pixels
 
 
-@pytest.mark.parametrize("oversample", [1.3, 2, 4, 8])
+@pytest.mark.parametrize("oversample", quick_of([1.3, 8], [1.3, 2, 4, 8]))
 def test_figures_do_not_depend_on_the_spacing(oversample):
     """From just finer than the resolution to far finer; the cut of the coarsest is 3.6 IRW at least."""
     seen = Pass()

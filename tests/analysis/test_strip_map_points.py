@@ -36,7 +36,7 @@ def test_unit_points_of_a_strip_map_read_0_dbsm_wherever_all_of_their_rows_are(s
 
 
 def test_raw_records_of_a_down_chirp_read_0_dbsm_too():
-    raw, near = strip_map.history(), strip_map.POINTS[3]
+    raw, near = strip_map.history(strip_map.POINTS[3:]), strip_map.POINTS[3]
     grid = sarcl.ImageGrid.plane(center=near, shape=(96, 80), spacing=(0.35, 1.0))
     seen = sarcl.measure(sarcl.backproject(raw, grid, beam=strip_map.BEAM), near=near)
     assert abs(10 * np.log10(seen.rcs)) <= 0.02

@@ -24,15 +24,14 @@ from sarcl.reference.backproject import backproject as reference
 # A peer that takes the exact sum of the case it is given, and does what else its name says.
 STAND_IN = """
 import json, sys
+if sys.argv[1:2] == ["once"]:
+    sys.exit(0)
 import numpy as np
 from pathlib import Path
-from sarcl.bench import backproject as bench
 from sarcl.bench import _cases, exact
 folder = None
 def answer(content):
     print(json.dumps(content), flush=True)
-if sys.argv[1:2] == ["once"]:
-    sys.exit(0)
 answer({"name": "stand-in", "version": "1", "python": "3"})
 for line in sys.stdin:
     request = json.loads(line)
@@ -281,7 +280,7 @@ def test_sarcl_and_a_peer_in_one_run(stand_in, tmp_path):
 
 
 def test_a_peer_that_dies_costs_its_own_lines_only(stand_in):
-    document = bench.run(**{**SMALL, "methods": ["direct"]}, peer_python=stand_in(dies=True))
+    document = bench.run(**{**SMALL, "methods": ["direct"], "repeats": 1}, peer_python=stand_in(dies=True))
     rows = {(r["who"], r["setting"]): r for r in document["cases"][0]["rows"]}
     for upsample in (4, 8, 16):
         assert "the stand-in fell over" in rows["stand-in 1", f"cubic, {upsample} x"]["absent"]
@@ -293,7 +292,7 @@ def test_a_python_without_the_peer_is_a_line_not_an_error(tmp_path, monkeypatch)
     empty.write_text("raise ImportError('No module named fastsar')")
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")]))
     lines = []
-    document = bench.run(**{**SMALL, "methods": ["direct"]}, say=lines.append)
+    document = bench.run(**{**SMALL, "methods": ["direct"], "repeats": 1}, say=lines.append)
     assert "No module named fastsar" in document["peers"][0]["absent"]
     assert sum("peer fastsar: absent: No module named fastsar" in line for line in lines) == 1
     assert {r["who"] for r in document["cases"][0]["rows"]} == {"sarcl", "NumPy"}

@@ -14,7 +14,7 @@ from sarcl.figures import plots
 
 SIZES = {
     "channels of an array": 9, "spectral echo": 512, "range-Doppler": 256, "full wave": 16, "beam of an array": 8,
-    "echo with edges": 8, "echo with bounces": 8, "radar cross section": 8,
+    "echo with edges": 3, "echo with bounces": 3, "radar cross section": 3,
 }  # fmt: skip
 SLOW = ("full wave", "echo of facets")
 

@@ -16,7 +16,7 @@ import pytest
 from helpers import tasks
 
 pytestmark = pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="timers that end a task")
-SECONDS = 60.0  # of CPU, in CI
+SECONDS = 30.0  # of CPU, in CI
 FIRST, FEW = 2000, 8  # number of the first task, and how many run elsewhere
 FEWEST_RIGHT = 0.6  # share of tasks that are done, not refused: else they would try nothing
 

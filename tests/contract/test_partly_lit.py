@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.cases import thinned
+from helpers.cases import quick_of, thinned
 from helpers.lit_cases import FAR, exact_echo, lit_polygon
 
 import sarcl
@@ -125,7 +125,7 @@ def test_scenes_that_shadow_themselves_keep_the_tolerance(name, tolerance):
     assert relative_error(raw, scene, pulses=(0, 3)) <= raw.report.predicted_error <= tolerance
 
 
-@pytest.mark.parametrize("tolerance", [1e-1, 1e-2])
+@pytest.mark.parametrize("tolerance", quick_of([1e-2], [1e-1, 1e-2]))
 def test_a_facet_is_lit_where_both_antennas_see_it(tolerance):
     scene, u = boxes(), sights(0.6, 0.35, n=3)
     receivers = track(sights(0.5, 0.8, n=3))
@@ -134,9 +134,9 @@ def test_a_facet_is_lit_where_both_antennas_see_it(tolerance):
 
 
 def test_every_look_by_itself_is_the_look_among_others():
-    scene, u = boxes(), sights(0.6, 0.35, n=6, arc=0.3)
+    scene, u = boxes(), sights(0.6, 0.35, n=3, arc=0.3)
     together = sarcl.echo(scene, CHIRP, track(u), tolerance=1e-2, **WINDOW).samples
-    alone = [sarcl.echo(scene, CHIRP, track(u[i : i + 1]), tolerance=1e-2, **WINDOW).samples[0] for i in range(6)]
+    alone = [sarcl.echo(scene, CHIRP, track(u[i : i + 1]), tolerance=1e-2, **WINDOW).samples[0] for i in range(3)]
     assert np.linalg.norm(together - alone) <= 2e-2 * np.linalg.norm(alone)
 
 
@@ -162,8 +162,8 @@ def test_a_convex_closed_body_has_the_same_echo_without_shadows(seed):
         assert np.linalg.norm(lit - whole) <= 1e-6 * np.linalg.norm(whole)
 
 
-@pytest.mark.parametrize("two_sided", [False, True])
-def test_a_terrain_and_a_house_sunk_in_it_have_the_echo_of_the_same_facets_without_heights(two_sided):
+@pytest.mark.parametrize("two_sided, bistatic", thinned([False, True], [False, True]))
+def test_a_terrain_and_a_house_sunk_in_it_have_the_echo_of_the_same_facets_without_heights(two_sided, bistatic):
     """Of a terrain only slopes that face away from an antenna are searched for shadows; of other facets, all are."""
     axis, slow = np.linspace(-20.0, 20.0, 7), sarcl.Waveform.chirp(center=1e9, bandwidth=30e6, duration=1e-6)
     scene = sarcl.Scene.from_heights(axis, axis, np.random.default_rng(1).normal(0.0, 2.0, (7, 7)))
@@ -172,11 +172,10 @@ def test_a_terrain_and_a_house_sunk_in_it_have_the_echo_of_the_same_facets_witho
     low, high = (
         sarcl.Trajectory(np.arange(3), [[x, y, z] for y in (-5e3, 0, 5e3)]) for x, z in ((-3e5, 7e4), (-1e5, 1.2e5))
     )
-    for receiver in (None, high):
-        options = {"receiver": receiver, "tolerance": 1e-1, "check": False}
-        wanted = sarcl.echo(replace(scene, heights=None), slow, low, **options).samples
-        change, dark = (sarcl.echo(scene, slow, low, shadows=s, **options).samples - wanted for s in (True, False))
-        assert np.linalg.norm(change) < 1e-5 * np.linalg.norm(wanted) < 1e-4 * np.linalg.norm(dark)
+    options = {"receiver": high if bistatic else None, "tolerance": 1e-1, "check": False}
+    wanted = sarcl.echo(replace(scene, heights=None), slow, low, **options).samples
+    change, dark = (sarcl.echo(scene, slow, low, shadows=s, **options).samples - wanted for s in (True, False))
+    assert np.linalg.norm(change) < 1e-5 * np.linalg.norm(wanted) < 1e-4 * np.linalg.norm(dark)
 
 
 def test_the_check_recomputes_lit_parts_by_the_reference():

@@ -7,7 +7,7 @@ import pickle
 import numpy as np
 import pytest
 import trimesh
-from helpers.cases import planned_within, thinned
+from helpers.cases import planned_within, quick_of, thinned
 
 import sarcl
 
@@ -190,7 +190,7 @@ def spectral(scene, tolerance, **options):
     return planned_within({"few_looks": 0}, sarcl.spectral_echo, scene, CHIRP, LINE, **options).run()
 
 
-@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow if "gentle" in n else ()) for n in SCENES])
+@pytest.mark.parametrize("name", quick_of(["poles", "hills"], SCENES))
 def test_spectral_echoes_with_sampled_shadows_meet_the_tolerance(name):
     scene = SCENES[name]()
     wanted = echo(scene, (LINE, None), np.inf, 3e-4)

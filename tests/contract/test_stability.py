@@ -105,10 +105,10 @@ def test_a_point_120_db_below_its_neighbour_is_seen_at_1e_7():
     raw = sarcl.PhaseHistory(
         both, frequency=frequency[0], frequency_step=300e6 / n_samples, tx=track, reference_range=reference
     )
-    grid = sarcl.ImageGrid.plane(shape=(160, 160), spacing=0.2)
+    grid = sarcl.ImageGrid.plane(shape=(110, 110), spacing=0.2)
     image = sarcl.backproject(raw, grid, tolerance=1e-7, check=False)
     assert image.data.dtype == np.complex128
-    at = (80 + 30, 80 + 40)
+    at = (55 + 30, 55 + 40)
     strong = sarcl.PhaseHistory(
         echo(np.zeros(3), 1.0), frequency=frequency[0], frequency_step=300e6 / n_samples, tx=track,
         reference_range=reference,
@@ -145,7 +145,7 @@ def test_direct_pixels_on_both_sides_of_the_range_window():
     half = C / 2 / 300e6 * 64 / 2
     grid = sarcl.ImageGrid.plane(shape=(40, 400), spacing=0.25)
     image = sarcl.backproject(raw, grid, tolerance=1e-2, method="direct", check=False)
-    assert image_error(image, raw, most=2000, exact=quick_sum) <= image.report.predicted_error <= 1e-2
+    assert image_error(image, raw, most=500, exact=quick_sum) <= image.report.predicted_error <= 1e-2
     assert not image.data[:, np.abs(grid.positions[0, :, 0]) > half + 1].any()
 
 
@@ -160,15 +160,15 @@ def test_sub_apertures_on_both_sides_of_a_window_that_moves(sights):
     assert coverage.directly and any(rows is not None and rows.any() for rows in merged)
     crossed = np.flatnonzero(np.abs(grid.positions[..., 0]) > 94)  # by the edge, at 137 +- 43 m on the ground
     for among in (None, crossed):
-        assert image_error(image, raw, most=200, among=among, exact=quick_sum) <= image.report.predicted_error <= 1e-2
+        assert image_error(image, raw, most=100, among=among, exact=quick_sum) <= image.report.predicted_error <= 1e-2
 
 
 @pytest.mark.parametrize("method", ["direct", "factorized"])
 def test_a_pixel_exactly_on_the_windows_edge_falls_to_either_side(sights, method):
     # rows are equal and every one has its window's edge at the same pixel, as near as float64 can tell
-    n = 400
-    grid = sarcl.ImageGrid.plane(shape=(150, 1000), spacing=0.25)
-    edge = 75, 700
+    n, height = 400, 150 if method == "factorized" else 20
+    grid = sarcl.ImageGrid.plane(shape=(height, 1000), spacing=0.25)
+    edge = height // 2, 700
     point = grid.at(*map(np.array, edge))
     plain = noise_on(straight(n), n_samples=256)
     half = C / 4 / plain.frequency_step[0]
@@ -180,7 +180,7 @@ def test_a_pixel_exactly_on_the_windows_edge_falls_to_either_side(sights, method
     rows_in = image.data[edge] / each  # each row adds the same, or nothing
     assert abs(rows_in - np.clip(rows_in.real, 0, n)) <= 1e-2 * n
     others = np.delete(np.arange(grid.size), np.ravel_multi_index(edge, grid.shape))
-    assert image_error(image, raw, most=300, among=others, exact=quick_sum) <= image.report.predicted_error <= 1e-2
+    assert image_error(image, raw, most=100, among=others, exact=quick_sum) <= image.report.predicted_error <= 1e-2
 
 
 def test_coincident_points_get_the_same_pixel():

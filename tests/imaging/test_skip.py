@@ -151,8 +151,7 @@ def test_pairs_left_out_are_pairs_that_no_pulse_sees():
     assert 0.3 * (outside + unlit) < skipped["range window"] + skipped["beam"] <= outside + unlit
 
 
-@pytest.mark.parametrize("angle", [0.02, 1.0, np.pi, 4.0, 6.2])
-@pytest.mark.parametrize("distance", [8.0, 60.0, 800e3])
+@pytest.mark.parametrize("distance, angle", thinned([8.0, 60.0, 800e3], [0.02, 1.0, np.pi, 4.0, 6.2]))
 def test_any_angle_at_any_distance(device, angle, distance):
     # antennas over, in and beside the scene: points ahead of them, behind them, and at the cone's tip
     raw = noise_history(n_rows=8, n_samples=32, distance=distance, bandwidth=100e6)
@@ -212,7 +211,7 @@ def test_sub_apertures_merge_rows_that_see_a_tile_whole_and_add_the_others_direc
     assert sight.merged.any() and any(rows is not None for _, rows in sight.directly) and sight.missed[1].any()
     options = {"tolerance": 1e-2, "beam": beam, "method": "factorized", "device": device}
     image = sarcl.backproject(raw, grid, **options)
-    assert near(image, raw, beam) <= image.report.predicted_error <= 1e-2
+    assert near(image, raw, beam, most=100) <= image.report.predicted_error <= 1e-2
     whole = sarcl.backproject(raw, grid, skip=False, **options)
     assert change(whole, image) <= 1e-6
     assert image.report.contributions_skipped["beam"] > 0.1 * raw.n_rows * grid.size
@@ -225,7 +224,7 @@ def test_bytes_do_not_change_what_sub_apertures_make_of_a_stripmap():
     images = [
         sarcl.backproject(raw, grid, beam=beam, tolerance=1e-2, method="factorized", max_bytes=b) for b in (None, 2e7)
     ]
-    assert change(*images) <= 1e-6 and near(images[0], raw, beam) <= 1e-2
+    assert change(*images) <= 1e-6 and near(images[0], raw, beam, most=100) <= 1e-2
     assert images[0].report.contributions_skipped == images[1].report.contributions_skipped
 
 
@@ -250,7 +249,7 @@ def test_sub_apertures_take_rows_that_see_a_tile_whole_and_no_others():
     assert sight.merged.all() and not sight.directly and all(rows.sum() == 200 for rows in sight.left_out)
     assert (sight.missed == [[0], [200]]).all()
     image = sarcl.backproject(raw, grid, beam=beam, tolerance=1e-2, method="factorized")
-    assert near(image, raw, beam) <= 1e-2
+    assert near(image, raw, beam, most=100) <= 1e-2
     assert image.report.contributions_skipped["beam"] == 200 * grid.size
     # with a beam that contains no pixel, no contribution is computed
     dark = sarcl.backproject(raw, grid, beam=(0.2, (-1, 0, 0)), tolerance=1e-2, method="factorized")
@@ -262,7 +261,7 @@ def test_sub_apertures_with_a_window_and_a_beam():
     grid = ImageGrid.plane(shape=(200, 300), spacing=0.3)
     image = sarcl.backproject(raw, grid, beam=beam, tolerance=1e-2, method="factorized")
     straight = sarcl.backproject(raw, grid, beam=beam, tolerance=1e-2, method="direct")
-    assert near(image, raw, beam) <= 1e-2 and near(straight, raw, beam) <= 1e-2
+    assert near(image, raw, beam, most=200) <= 1e-2 and near(straight, raw, beam, most=200) <= 1e-2
     for made in (image, straight):
         assert min(made.report.contributions_skipped[r] for r in ("range window", "beam")) > 0
         assert total(made) == raw.n_rows * grid.size

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from earth_targets import CASES, C, aircraft, two_way
+from helpers.cases import quick_of, thinned
 
 import sarcl
 
@@ -76,9 +77,13 @@ def errors(path):
     return kinds["Error"], kinds["Warning"]
 
 
+QUICK = ("aircraft", True), ("orbit", False)  # with SLOW, both platforms, mono- and bistatic
+SLOW = ("aircraft", False), ("orbit", True)
+
+
 @pytest.fixture(
     scope="module",
-    params=[(n, b) for n in CASES for b in (False, True)],
+    params=[*QUICK, *(pytest.param(each, marks=pytest.mark.slow) for each in SLOW)],
     ids=lambda p: f"{p[0]}-{'bi' * p[1] or 'mono'}",
 )
 def case(request):
@@ -99,8 +104,7 @@ def test_the_checker_of_sarkit_finds_no_error(written):
     assert advice <= {"check_iprbw_to_ss_osr_row", "check_iprbw_to_ss_osr_col"}  # finer pixels than a reader needs
 
 
-@pytest.mark.parametrize("turn", TURNS)
-@pytest.mark.parametrize("normal", [1.0, -1.0])
+@pytest.mark.parametrize("normal, turn", thinned([1.0, -1.0], TURNS))
 def test_rows_lead_away_from_the_antenna_however_the_grid_lies(tmp_path, turn, normal):
     case = aircraft(False)
     image = focused(case, TURNS[turn], normal)
@@ -393,7 +397,12 @@ def test_the_metadata_stay_in_other_files(tmp_path):
     assert back[5:20, ::2].grid.shape == (15, 20)
 
 
-@pytest.mark.parametrize(("window", "wider"), [(None, 1.0), ("hamming", 1.47), (("taylor", 35, 5), 1.35)])
+@pytest.mark.parametrize(
+    "window, wider",
+    quick_of(
+        [("hamming", 1.47), (("taylor", 35, 5), 1.35)], [(None, 1.0), ("hamming", 1.47), (("taylor", 35, 5), 1.35)]
+    ),
+)
 def test_windows_widen_the_response(tmp_path, window, wider):
     case = aircraft(False)
     widths = []

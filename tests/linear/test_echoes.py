@@ -202,6 +202,7 @@ def test_weights_windows_and_the_waveform_are_in_both_directions():
         [(name, two) for name in ("tapered", "gaussian", "table that shrinks") for two in (False, True)],
     ),
 )
+@pytest.mark.costly
 def test_antennas_weigh_both_directions_in_float64(name, bistatic, double):
     """Gains at the centre of the band, in the matrix and in A; a beam cuts both."""
     like = noise_history(n_rows=12, n_samples=24, distance=100.0, bandwidth=100e6, bistatic=bistatic)
