@@ -60,6 +60,8 @@ def cut_away(pieces: list[np.ndarray], shadows: list[np.ndarray]) -> list[np.nda
     for corners in shadows:
         left, sides, low, high = [], _edges(corners), corners.min(axis=0), corners.max(axis=0)
         for piece in pieces:
+            if len(piece) < 3:
+                continue
             if (piece.max(axis=0) < low).any() or (piece.min(axis=0) > high).any():
                 left.append(piece)
                 continue

@@ -12,6 +12,7 @@ For other folders:
     facet_shadows          what casts shadows in a scene, and what antennas see of pieces of facets
     facets                 facets ready for the kernel: subdivided, displaced, culled, illuminated
     facing_corners         what single reflections leave out where flat parts face each other at right angles
+    half_plane             waves beside the edge of a half-plane that reflects them
     kept_amplitudes        error of amplitudes that are interpolated between antenna positions, with phases
     physical_optics        phase integral, Fresnel coefficients and scattering matrix of a planar facet
     pulse_nodes            pulses at which amplitudes are computed, with cubic interpolation between them

@@ -14,7 +14,7 @@ from ..scattering.facets import FacetSet, Light
 from ..scattering.scatterers import Points
 from ..scene.triangles import centroids
 from .bounces.bounce_spreader import BounceScene, BounceSpreader
-from .edges.edge_echoes import EdgeEchoes
+from .edges.edge_echoes import EdgeEchoes, PreparedEdges
 from .facets.exact_facets import facet_samples, inside_window
 from .facets.facets_behind_sheets import SheetEchoes
 from .scene_echoes import SceneEchoes
@@ -123,7 +123,7 @@ def exact(
         for _, value, power in EdgeEchoes(scene.edges, view).exactly(np.array([pulse]), frequencies):
             values, powers = values + value[0], powers + power[0]
     if scene.bounced is not None:
-        values = values + _bounced(scene.bounced, view, pulse)
+        values = values + _bounced(scene.bounced, view, pulse, scene.edges)
     return values, powers
 
 
@@ -158,14 +158,15 @@ def _exact(part: Points | FacetSet, view: ChannelView, p: int) -> tuple[np.ndarr
     return values, powers
 
 
-def _bounced(scene: BounceScene, view: ChannelView, pulse: int) -> np.ndarray:
+def _bounced(scene: BounceScene, view: ChannelView, pulse: int, edges: PreparedEdges | None) -> np.ndarray:
     """Samples (n_polarizations, n) of a pulse of what facets reflect to one another: by the reference, of few facets
-    without antennas' weights, and otherwise by the beams themselves, each added at every frequency."""
+    without antennas' weights and waves beside edges, and otherwise by the beams, each added at every frequency."""
     from ..reference.bounces import NO_WINDOW, Reflectors, bounce_echo
 
     antennas, surfaces, coatings = view.antennas, scene.surfaces, scene.coatings
-    if len(scene.mirrors) > MOST_REFLECTORS or view.weights.is_needed or surfaces.ground:
-        return np.asarray(BounceSpreader(scene, view).values(np.array([pulse]), view.frequencies, exact=True)[0][0])
+    beams = BounceSpreader(scene, view, None if edges is None else edges.pieces.ends)
+    if len(scene.mirrors) > MOST_REFLECTORS or view.weights.is_needed or surfaces.ground or beams.has_transitions:
+        return np.asarray(beams.values(np.array([pulse]), view.frequencies, exact=True)[0][0])
     eps = np.stack([coatings.permittivity(f)[coatings.material] for f in view.frequencies.tolist()])
     reflectivity = coatings.reflectivity * surfaces.mirrors
     sums = bounce_echo(

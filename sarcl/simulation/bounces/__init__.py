@@ -14,6 +14,7 @@ For this folder alone:
     _paths           beams of all orders, as many at a time as memory holds
     _polygons        convex polygons in space, clipped many at a time
     _sums            sums over triangles at all frequencies of the samples
+    _transitions     waves beside free edges of the facets that reflected them before
     _weak_beams      bounds on the echoes of beams, and which are too weak to be followed
 """
 

@@ -45,6 +45,11 @@ class LitBeams:
     n_pairs: int
     n_weak: int
 
+    def part(self, rows: np.ndarray) -> LitBeams:
+        """The beams `rows`, rising (n,)."""
+        own = np.flatnonzero(np.isin(self.of, rows))
+        return LitBeams(self.beams[rows], self.pieces[own], np.searchsorted(rows, self.of[own]), 0, 0)
+
 
 @dataclass(frozen=True, eq=False)
 class Paths:
@@ -129,6 +134,11 @@ class Paths:
         arrives = np.bincount(of, minlength=len(beams)) > 0
         beams, of = beams[np.flatnonzero(arrives)], (np.cumsum(arrives) - 1)[of]
         return beams, *_occlusion.seen(surfaces, beams, pieces, of, self.rx[beams.pulse], turn)
+
+    def unshaded(self, beams: Beams) -> tuple[Polygons, np.ndarray]:
+        """What receivers see of beams less all shadows: pieces, and the beam of each (n,)."""
+        pieces, of = _occlusion.lit(self.surfaces, beams, self.turn)
+        return _occlusion.seen(self.surfaces, beams, pieces, of, self.rx[beams.pulse], self.turn)
 
 
 def blocks(surfaces: Surfaces, tx: np.ndarray, rx: np.ndarray, most: int) -> Iterator[slice]:

@@ -24,6 +24,7 @@ from ._facet_tree import MOST_PAIRS, PAIR_BYTES
 from ._flat_facets import closed, joined_facets, tiles
 from ._paths import BeamLimits, LitBeams, Paths, blocks
 from ._polygons import Polygons, joined
+from ._transitions import LARGEST, LONGEST_DETOUR, Transitions, free_edges
 from ._weak_beams import Budget
 
 PULSES_AT_ONCE, BEAMS_AT_ONCE = 128, 60_000  # pulses of a block, and pairs of these and facets that reflect to others
@@ -37,6 +38,7 @@ PROFILES = 1 / 300  # of the tolerance: error of sums over frequencies
 MOST_SHADING = 20_000  # facets that only cast shadows, from which on joining them would take longer than it saves
 FLATNESS = 0.25  # rad over the tolerance: phases of corners of a flat part, by their distances from its plane
 NARROW = 0.5  # share of the area in facets narrower than a wavelength from which on there is a warning
+CELLS, CELL = 200_000, 0.5  # parts of facets beside edges that are held together, area over tolerance wavelength^2
 NODES = 6  # frequencies at which matrices of dispersive materials are computed
 
 
@@ -143,13 +145,21 @@ class BounceSpreader:
     narrow           share of the area in facets narrower than a wavelength
     """
 
-    def __init__(self, scene: BounceScene, view: ChannelView) -> None:
+    def __init__(self, scene: BounceScene, view: ChannelView, diffracting: np.ndarray | None = None) -> None:
         self.scene, self.view = scene, view
         self.predicted_error = scene.tolerance
         surfaces, self._coatings = scene.joined
         antennas = np.concatenate([view.antennas.tx, view.antennas.rx]) - scene.origin
         self._surfaces = surfaces.seen_from(antennas)
         wavelength = SPEED_OF_LIGHT / float(np.median(view.frequencies))
+        self._free: np.ndarray | None = None
+        self._beside = dict[str, Any]()
+        if diffracting is not None and surfaces.diagonal > LARGEST * wavelength:
+            left_out = f"left out, the scene is larger than {LARGEST:.0f} wavelengths (docs/theory/edges.md)"
+            self._beside = {"waves beside edges, between reflections": left_out}
+        elif diffracting is not None:
+            self._free = free_edges(surfaces, diffracting - scene.origin)
+            self._beside = {"waves beside edges, between reflections": f"{int(self._free.sum())} edges"}
         self.narrow = scene.narrow_share(wavelength)
         if self.narrow > NARROW:
             warn(
@@ -159,9 +169,15 @@ class BounceSpreader:
                 "narrow facets",
             )
 
+    @property
+    def has_transitions(self) -> bool:
+        """Whether waves beside free edges are computed."""
+        return self._free is not None
+
     def describe(self) -> dict[str, Any]:
         """Words and numbers for a report."""
-        return {"facets narrower than a wavelength": f"{self.narrow:.0%} of the area"} if self.narrow > NARROW else {}
+        narrow = {"facets narrower than a wavelength": f"{self.narrow:.0%} of the area"} if self.narrow > NARROW else {}
+        return narrow | self._beside
 
     def add(
         self, samples: np.ndarray, pulses: Sequence[int], clock: Clock, on_progress: Callable[[int], object]
@@ -212,11 +228,42 @@ class BounceSpreader:
                     outside, late, latest = outside + len(hidden), late + power, max(latest, last)
             budget.power += (np.abs(echo) ** 2).sum(axis=1).mean(axis=1)
             out += echo
+            if self._free is not None:
+                numbers = np.unique(lit.of)
+                numbers = numbers[self._free[lit.beams.chains[:, :-1]].any(axis=(1, 2))[lit.beams.chain[numbers]]]
+                if len(numbers):
+                    out += self._transitions(self._free, paths, lit.part(numbers), pulses, frequencies, exact)
             done = len(np.unique(lit.of)) - outside
             orders = (0,) * (lit.beams.order - 1) + (done,)
             unseen = lit.n_pairs - lit.n_weak - outside - done
             counts += Counts(lit.n_pairs, outside, 0, 0, unseen, lit.n_weak, orders, late, latest=latest)
         return out, counts
+
+    def _transitions(
+        self,
+        free: np.ndarray,
+        paths: Paths,
+        lit: LitBeams,
+        pulses: np.ndarray,
+        frequencies: np.ndarray,
+        exact: bool,
+    ) -> np.ndarray:
+        """What Fresnel's transitions at free edges (k, n) of facets change of the echoes of beams: as `values`."""
+        out = np.zeros((2, len(pulses), len(self.view.polarizations), len(frequencies)), np.complex128)
+        sharp = self._facets(lit.beams, lit.pieces, lit.of, paths.rx)
+        self._add(out[0], pulses, frequencies, self._inside(sharp, pulses), exact)
+        edges, polygons = Transitions.of(self._surfaces, free, lit.beams)
+        beams = replace(lit.beams, polygons=polygons)
+        pieces, of = paths.unshaded(beams)
+        facets, rx = self._facets(beams, pieces, of, paths.rx) if len(of) else sharp, paths.rx[beams.pulse]
+        highest, tolerance = float(frequencies.max()), self.scene.tolerance
+        cell = CELL * tolerance * (SPEED_OF_LIGHT / highest) ** 2
+        for rows in in_blocks(1 + (facets.areas / cell).astype(int), CELLS):
+            triangles, of = edges.cut(facets.triangles[rows], facets.of[rows], rx, highest, tolerance)
+            if len(of):
+                cells = Facets(triangles, beams[of], rx[of], of)
+                self._add(out[1], pulses, frequencies, self._inside(cells, pulses), exact, edges)
+        return np.asarray(out[1] - out[0])
 
     def _pieces_at_once(self, lit: LitBeams, rx: np.ndarray) -> list[slice]:
         """Slices of the pieces of beams, each with all pieces of a beam, whose triangles memory holds."""
@@ -294,7 +341,15 @@ class BounceSpreader:
         np.add.at(sums, late.of, sent)
         return float((np.abs(sums) ** 2).sum()), float(delta.max())
 
-    def _add(self, out: np.ndarray, pulses: np.ndarray, frequencies: np.ndarray, facets: Facets, exact: bool) -> None:
+    def _add(
+        self,
+        out: np.ndarray,
+        pulses: np.ndarray,
+        frequencies: np.ndarray,
+        facets: Facets,
+        exact: bool,
+        transitions: Transitions | None = None,
+    ) -> None:
         view, scene, coatings = self.view, self.scene, self._coatings
         row = facets.beams.pulse
         delay = (facets.path - 2 * view.antennas.reference_range[pulses[row]]) / SPEED_OF_LIGHT
@@ -305,12 +360,16 @@ class BounceSpreader:
 
         def amplitudes(rows: np.ndarray, wanted: np.ndarray) -> np.ndarray:
             basis = lagrange(at, wanted)
-            shapes = facets.chosen(rows).shapes(wanted, coatings)
+            triangles = facets.chosen(rows)
+            shapes = triangles.shapes(wanted, coatings)
+            if transitions is not None:
+                shapes *= transitions.factors(triangles.of, triangles.center, wanted)
             return np.asarray(shapes[:, :, None] * np.einsum("nmj,mf->nfj", matrices[rows], basis))
 
         error = PROFILES * scene.tolerance
         extra = 1 + (NODES - 1) * varies + 4 * bool(coatings.height.any())
-        nodes = _sums.nodes_for(np.pi * float(np.ptp(band)) / SPEED_OF_LIGHT * facets.widest, error, extra)
+        widest = facets.widest + (0 if transitions is None else LONGEST_DETOUR * SPEED_OF_LIGHT / band[0])
+        nodes = _sums.nodes_for(np.pi * float(np.ptp(band)) / SPEED_OF_LIGHT * widest, error, extra)
         if exact:  # at any frequencies
             nodes = np.full(len(nodes), len(frequencies))
         _sums.add(out, frequencies, _sums.Delays(row, delay), amplitudes, nodes, error)

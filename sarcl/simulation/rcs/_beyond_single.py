@@ -80,14 +80,16 @@ def add_beyond_single_reflections(task: RcsTask, out: np.ndarray) -> None:
     weights = AntennaWeights(antennas, float(frequencies[-1]))
     view = ChannelView(antennas, weights, frequencies, 0.0, task.polarizations, UP, gated=False)
     share = SHARE * options.tolerance
+    diffracting = None
     if options.edges:
-        edges = EdgeEchoes(PreparedEdges.pieces_of(scene, options.crease, np.inf, task.shading_device, share), view)
+        prepared = PreparedEdges.pieces_of(scene, options.crease, np.inf, task.shading_device, share)
+        edges, diffracting = EdgeEchoes(prepared, view), prepared.pieces.ends
         for rows, values, _ in edges.exactly(np.arange(len(tx)), task.frequencies):
             out[rows] += values.transpose(0, 2, 1)
     bounced = BounceScene.of(scene, options.bounces, share, float(frequencies[-1]))
     if bounced is not None:
         bounced.refuse_many(tx, rx)
-        for rows, values in BounceSpreader(bounced, view).exactly(np.arange(len(tx)), task.frequencies):
+        for rows, values in BounceSpreader(bounced, view, diffracting).exactly(np.arange(len(tx)), task.frequencies):
             out[rows] += values.transpose(0, 2, 1)
 
 
