@@ -31,7 +31,7 @@ from .edges.edge_echoes import EdgeEchoes, PreparedEdges
 from .factorized.spreader import FactorizedSpreader
 from .planned_echoes import EchoWork, Method, PlannedEchoes
 from .scene_echoes import Added, SceneEchoes
-from .scene_plan import EDGES, SHADOWS, ScenePlan, parts_of, samples_shadows
+from .scene_plan import EDGES, SHADOWS, ScenePlan, samples_shadows
 from .scene_preparation import bounced_facets, warn_of_shapes
 from .spectral.spectral_task import spectral_task
 from .spreading import ChannelView
@@ -197,8 +197,7 @@ def _allotted(planned: PlannedEchoes) -> tuple[ErrorTerm, ...]:
         if request.bounces > 1:
             terms.append(ErrorTerm("bounces", share, SMALLER_TOLERANCE))
         if samples_shadows(request, scene.seen):
-            most = SHADOWS * request.tolerance / parts_of(request, scene.seen.scene)
-            terms.append(ErrorTerm("shadows", most, SMALLER_TOLERANCE))
+            terms.append(ErrorTerm("shadows", SHADOWS * request.tolerance, SMALLER_TOLERANCE))
     if request.crease is not None:
         terms.append(ErrorTerm("edges", EDGES * request.tolerance, SMALLER_TOLERANCE))
     return planned.method.between(tuple(terms))

@@ -27,7 +27,7 @@ from .spreading import PER_TILE, Band
 
 NODES = 0.3  # share of a tolerance: largest error of gains interpolated over the band, where there are enough nodes
 # share of a tolerance for shadows on rough facets, where they are counted in samples: looks take most of the time. The
-# rest of the sum of squares is 0.6, which two taps of range profiles still meet at 1e-2
+# rest of the sum of squares is 0.6, of all parts together, which two taps of range profiles still meet at 1e-2
 SHADOWS = 0.8
 EDGES = 0.2  # share of a tolerance for edges: they are weaker than facets, which keep 0.98 of it
 CUT_PROFILES = 1.5  # error of range profiles of cut facets, over the least of 64 of them: sums are longer than that
@@ -129,17 +129,13 @@ def cut_within(
         raise refused.restated(request.tolerance, reachable(plan, above), remedy) from None
 
 
-def parts_of(request: EchoRequest, scene: Scene) -> float:
-    """By how much a tolerance is divided among the scene's parts: errors of points, of facets and of what these reflect
-    to one another are independent."""
-    has_facets = len(scene.triangles) > 0
-    return float(np.sqrt(max((len(scene.positions) > 0) + has_facets + (has_facets and request.bounces > 1), 1)))
-
-
 def share_of(request: EchoRequest, seen: SeenScene, tolerance: float) -> float:
-    """The share of a tolerance that points have, and facets, beside those of edges and of shadows in samples."""
+    """The share of a tolerance that points have, that facets have, and what these reflect to one another, beside those
+    of edges and of shadows in samples: their errors are independent."""
+    scene, has_facets = seen.scene, len(seen.scene.triangles) > 0
+    parts = (len(scene.positions) > 0) + has_facets + (has_facets and request.bounces > 1)
     others = SHADOWS**2 * samples_shadows(request, seen) + EDGES**2 * (request.crease is not None)
-    return float(tolerance * np.sqrt(1 - others) / parts_of(request, seen.scene))
+    return float(tolerance * np.sqrt((1 - others) / max(parts, 1)))
 
 
 def samples_shadows(request: EchoRequest, seen: SeenScene) -> bool:

@@ -20,7 +20,6 @@ from ..scattering.mesh_quality.speckle_contrast import Speckle
 from ..scattering.rough_pieces import PIECE_BYTES, RoughFacets
 from ..scattering.scatterers import Points, facets_of, points_of
 from ..scattering.subdivision import Subdivision
-from ..scene.scene import Scene
 from .bounces.bounce_spreader import BounceScene
 from .echo_request import EchoRequest
 from .edges.edge_echoes import PreparedEdges
@@ -28,7 +27,7 @@ from .facets.facet_spreading import TiledFacets
 from .facets.facets_behind_sheets import FacetsBehindSheets
 from .points.point_plan import PreparedPoints
 from .scene_echoes import SceneEchoes
-from .scene_plan import SHADOWS, ScenePlan, parts_of, samples_shadows, with_clipped_shadows
+from .scene_plan import SHADOWS, ScenePlan, samples_shadows, with_clipped_shadows
 
 LEAST = 1e-30  # largest amplitude of a scene below which echoes approach the smallest numbers of complex64
 LARGEST = 1e30  # amplitude whose sums and spectra still fit in complex64
@@ -75,7 +74,7 @@ def _prepared(plan: ScenePlan, *, tiled: bool, exact: bool) -> SceneEchoes:
         shadows = ShadowRule(
             exact=exact,
             sampled=samples_shadows(request, seen),
-            accuracy=SHADOWS * request.tolerance / parts_of(request, seen.scene),
+            accuracy=SHADOWS * request.tolerance,
             max_bytes=request.budget / 4,
             margin=seen.margin,
             host=request.host,
@@ -110,7 +109,7 @@ def _prepared(plan: ScenePlan, *, tiled: bool, exact: bool) -> SceneEchoes:
         skipped=skipped,
         mesh_warnings=mesh_warnings,
         error_budget=plan.error_budget,
-        shadow_terms=_shadow_terms(request, seen.scene, facets),
+        shadow_terms=_shadow_terms(request, facets),
         bounced=bounced,
         behind_sheets=behind,
         n_pulses=len(seen.antennas),
@@ -169,17 +168,17 @@ def _tiled_facets(
     )
 
 
-def _shadow_terms(request: EchoRequest, scene: Scene, facets: Sequence[FacetSet]) -> tuple[ErrorTerm, ...]:
+def _shadow_terms(request: EchoRequest, facets: Sequence[FacetSet]) -> tuple[ErrorTerm, ...]:
     """Errors of shadows on rough facets that are counted in samples. ToleranceUnreachable where they exceed their
     share."""
     lights = [part.illumination for part in facets if part.illumination is not None and part.samples_incoherent_alone]
     if not lights:
         return ()
-    share, light = SHADOWS / parts_of(request, scene), lights[0]  # one for all
-    if light.error > share * request.tolerance:
+    light = lights[0]  # one for all
+    if light.error > SHADOWS * request.tolerance:
         raise _TooFewSamples(
             request.tolerance,
-            askable(rounded_up(1.05 * light.reached / share)),
+            askable(rounded_up(1.05 * light.reached / SHADOWS)),
             "shadow edges on rough facets, counted in samples at single pulses",
         )
     remedy = "a smaller tolerance: it asks for "
