@@ -168,7 +168,7 @@ def _beyond_single(planned: PlannedEchoes) -> float:
     begin = time.perf_counter()
     bounced = bounced_facets(scene)
     edges = PreparedEdges.of(request, seen)
-    ends = None if edges is None else edges.pieces.ends
+    ends = None if edges is None else edges.pieces.wedges
     spreaders: list[BounceSpreader | EdgeEchoes] = [] if bounced is None else [BounceSpreader(bounced, view, ends)]
     spreaders += [] if edges is None else [EdgeEchoes(edges, view)]
     seconds = time.perf_counter() - begin

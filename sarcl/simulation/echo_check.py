@@ -164,7 +164,7 @@ def _bounced(scene: BounceScene, view: ChannelView, pulse: int, edges: PreparedE
     from ..reference.bounces import NO_WINDOW, Reflectors, bounce_echo
 
     antennas, surfaces, coatings = view.antennas, scene.surfaces, scene.coatings
-    beams = BounceSpreader(scene, view, None if edges is None else edges.pieces.ends)
+    beams = BounceSpreader(scene, view, None if edges is None else edges.pieces.wedges)
     if len(scene.mirrors) > MOST_REFLECTORS or view.weights.is_needed or surfaces.ground or beams.has_transitions:
         return np.asarray(beams.values(np.array([pulse]), view.frequencies, exact=True)[0][0])
     eps = np.stack([coatings.permittivity(f)[coatings.material] for f in view.frequencies.tolist()])

@@ -189,7 +189,7 @@ class SceneEchoes:
             edges = EdgeEchoes(self.edges, view)
             spreaders.append(edges)
         if self.bounced is not None:
-            bounces = BounceSpreader(self.bounced, view, None if self.edges is None else self.edges.pieces.ends)
+            bounces = BounceSpreader(self.bounced, view, None if self.edges is None else self.edges.pieces.wedges)
             spreaders.append(bounces)
             parts.append((ErrorTerm("bounces", self.bounced.tolerance, SMALLER_TOLERANCE), bounces.describe()))
         chosen = max(parts, key=lambda part: (bool(part[1]), part[0].value))[1] if parts else {}

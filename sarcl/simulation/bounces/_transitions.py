@@ -15,10 +15,12 @@ import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.vectors import dot, unit
+from ...scattering.edge_diffraction import WedgeShape
 from ...scattering.half_plane import FADING, transition
 from ._beams import Beams, Surfaces, mirrored
 from ._polygons import Polygons, folded
 
+SAME_PLANE = 0.99  # cosine between normals of a facet and of a wedge's face on it
 SAME_LINE = 1e-5  # of a scene's diagonal, and rad: lines nearer to each other are one
 # Diagonal of a scene in wavelengths up to which transitions are computed: what a corner loses by them falls as the root
 # of the wavelength over its arm, 1 dB at 12 wavelengths; cells are parts of a wavelength, and their number grows
@@ -29,14 +31,17 @@ LEAST_CELL = 0.1  # of tolerance times wavelength^2: smaller triangles are not c
 ROUNDS = 60  # of cutting triangles in two
 
 
-def free_edges(surfaces: Surfaces, ends: np.ndarray) -> np.ndarray:
+def free_edges(surfaces: Surfaces, ends: np.ndarray, shape: WedgeShape) -> np.ndarray:
     """Which edges of facets, from each corner to the next, have their middle on one of the edges that diffract, with
-    ends, m (e, 2, 3): bool (k, n)."""
+    ends, m (e, 2, 3), on the sides of the facet behind and in front: bool (k, n, 2).
+
+    A fold of sheets is a wedge on their backs, and none on the sides that face one another.
+    """
     from scipy.spatial import cKDTree
 
     corners, size = surfaces.corners, surfaces.diagonal
     after = np.roll(corners, -1, axis=1)
-    out = np.zeros(corners.shape[:2], bool)
+    out = np.zeros((*corners.shape[:2], 2), bool)
     facet, number = np.nonzero((np.abs(after - corners).max(axis=-1) > surfaces.snap) & surfaces.mirrors[:, None])
     if not len(ends) or not len(facet):
         return out
@@ -52,8 +57,13 @@ def free_edges(surfaces: Surfaces, ends: np.ndarray) -> np.ndarray:
     edge = np.array([e for one in near for e in one], np.int64) % len(ends)
     along = dot(middle[owner] - ends[edge, 0], way[edge])
     is_on = (along > 0) & (along < np.linalg.norm(ends[edge, 1] - ends[edge, 0], axis=1))
-    free = owner[is_on]
-    out[facet[free], number[free]] = True
+    free, edge, angle = owner[is_on], edge[is_on], np.pi * shape.number[:, None]
+    second = np.sin(angle) * shape.inward - np.cos(angle) * shape.normal  # outward normal of face 2
+    for side, sign in enumerate((-1.0, 1.0)):
+        normal = sign * surfaces.normals[facet[free]]
+        is_face = np.maximum(dot(normal, shape.normal[edge]), dot(normal, second[edge])) > SAME_PLANE
+        rows = free[is_face]
+        out[facet[rows], number[rows], side] = True
     return out
 
 
@@ -73,16 +83,17 @@ class Transitions:
 
     @classmethod
     def of(cls, surfaces: Surfaces, free: np.ndarray, beams: Beams) -> tuple[Transitions, Polygons]:
-        """Those of beams, where facets have `free` edges (k, n); and all of each last facet that a wave reaches beside
-        these edges: it ends at other edges, and where it would come from behind a facet."""
+        """Those of beams, where facets have `free` edges (k, n, 2); and all of each last facet that a wave reaches
+        beside these edges: it ends at other edges, and where it would come from behind a facet."""
         chains, normals = beams.chains[beams.chain], beams.normals[beams.chain]
         polygons = surfaces.polygons[beams.last]
         starts, ways, planes, frees = [], [], [], []
         for i in range(beams.order - 1):
             facet = chains[:, i]
             corners, count = surfaces.corners[facet], surfaces.polygons.count[facet]
-            is_free = free[facet]
-            for j in range(i + 1, beams.order):  # an edge on a facet that the wave meets later is no end of it
+            is_free = free[facet, :, surfaces.side(facet, normals[:, i])]
+            # an edge on another facet of the beam is a fold: no end of it
+            for j in set(range(beams.order)) - {i}:
                 point = surfaces.centers[chains[:, j]]
                 is_on = Polygons(corners, count).heights(normals[:, j], point, surfaces.on_plane) == 0
                 is_free = is_free & ~(is_on & np.roll(is_on, -1, axis=1))

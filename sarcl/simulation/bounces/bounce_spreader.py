@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from ...base.constants import SPEED_OF_LIGHT
 from ...base.errors import warn
 from ...base.stage_timer import Clock
 from ...numerics.polynomials import chebyshev, lagrange
+from ...scattering.edge_diffraction import WedgeShape
 from ...scene.scene import Scene
 from ...scene.triangles import bisect, edges, solid
 from ..spreading import ChannelView, Counts
@@ -40,6 +41,8 @@ FLATNESS = 0.25  # rad over the tolerance: phases of corners of a flat part, by 
 NARROW = 0.5  # share of the area in facets narrower than a wavelength from which on there is a warning
 CELLS, CELL = 200_000, 0.5  # parts of facets beside edges that are held together, area over tolerance wavelength^2
 NODES = 6  # frequencies at which matrices of dispersive materials are computed
+
+DiffractingEdges: TypeAlias = tuple[np.ndarray, WedgeShape]  # ends, m (e, 2, 3), and wedges
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +148,7 @@ class BounceSpreader:
     narrow           share of the area in facets narrower than a wavelength
     """
 
-    def __init__(self, scene: BounceScene, view: ChannelView, diffracting: np.ndarray | None = None) -> None:
+    def __init__(self, scene: BounceScene, view: ChannelView, diffracting: DiffractingEdges | None = None) -> None:
         self.scene, self.view = scene, view
         self.predicted_error = scene.tolerance
         surfaces, self._coatings = scene.joined
@@ -158,8 +161,8 @@ class BounceSpreader:
             left_out = f"left out, the scene is larger than {LARGEST:.0f} wavelengths (docs/theory/edges.md)"
             self._beside = {"waves beside edges, between reflections": left_out}
         elif diffracting is not None:
-            self._free = free_edges(surfaces, diffracting - scene.origin)
-            self._beside = {"waves beside edges, between reflections": f"{int(self._free.sum())} edges"}
+            self._free = free_edges(surfaces, diffracting[0] - scene.origin, diffracting[1])
+            self._beside = {"waves beside edges, between reflections": f"{int(self._free.any(axis=-1).sum())} edges"}
         self.narrow = scene.narrow_share(wavelength)
         if self.narrow > NARROW:
             warn(
@@ -230,7 +233,7 @@ class BounceSpreader:
             out += echo
             if self._free is not None:
                 numbers = np.unique(lit.of)
-                numbers = numbers[self._free[lit.beams.chains[:, :-1]].any(axis=(1, 2))[lit.beams.chain[numbers]]]
+                numbers = numbers[self._free[lit.beams.chains[:, :-1]].any(axis=(1, 2, 3))[lit.beams.chain[numbers]]]
                 if len(numbers):
                     out += self._transitions(self._free, paths, lit.part(numbers), pulses, frequencies, exact)
             done = len(np.unique(lit.of)) - outside
@@ -248,7 +251,7 @@ class BounceSpreader:
         frequencies: np.ndarray,
         exact: bool,
     ) -> np.ndarray:
-        """What Fresnel's transitions at free edges (k, n) of facets change of the echoes of beams: as `values`."""
+        """What Fresnel's transitions at free edges (k, n, 2) of facets change of the echoes of beams: as `values`."""
         out = np.zeros((2, len(pulses), len(self.view.polarizations), len(frequencies)), np.complex128)
         sharp = self._facets(lit.beams, lit.pieces, lit.of, paths.rx)
         self._add(out[0], pulses, frequencies, self._inside(sharp, pulses), exact)

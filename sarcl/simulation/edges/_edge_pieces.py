@@ -40,6 +40,11 @@ class EdgePieces:
     def __len__(self) -> int:
         return int(self.parts.sum())
 
+    @property
+    def wedges(self) -> tuple[np.ndarray, WedgeShape]:
+        """Ends of the edges, m (e, 2, 3), and their wedges."""
+        return self.ends, self.shape
+
     @cached_property
     def edge(self) -> np.ndarray:
         """The edge of each piece (n,)."""

@@ -83,7 +83,7 @@ def add_beyond_single_reflections(task: RcsTask, out: np.ndarray) -> None:
     diffracting = None
     if options.edges:
         prepared = PreparedEdges.pieces_of(scene, options.crease, np.inf, task.shading_device, share)
-        edges, diffracting = EdgeEchoes(prepared, view), prepared.pieces.ends
+        edges, diffracting = EdgeEchoes(prepared, view), prepared.pieces.wedges
         for rows, values, _ in edges.exactly(np.arange(len(tx)), task.frequencies):
             out[rows] += values.transpose(0, 2, 1)
     bounced = BounceScene.of(scene, options.bounces, share, float(frequencies[-1]))

@@ -143,6 +143,7 @@ CORNERS = [
     ((2.0, 2.0, 2.0, 90), (np.pi / 4, 0.0), 0.05, 5.0),
     ((3.0, 3.0, 2.0, 90), (np.pi / 4 + 0.2, 0.1), 0.1, 2.5),
     ((4.0, 8.0, 3.0, 90), (0.6, 0.2), 0.07, 5.0),
+    ((2.0, 4.0, 2.0, 90), (0.6, 0.2), 0.08, 0.9),  # no better than sharp beams, and no worse
     ((3.0, 3.0, 2.0, 100), (0.8, 0.1), 0.35, 2.0),
 ]
 
@@ -168,3 +169,16 @@ def test_the_report_says_what_of_waves_beside_edges_is_computed(arm, words):
     options = {"reference": (0, 0, 0), "range_window": (-200, 200), "tolerance": 0.1}
     plan = sarcl.echo(scene, chirp, track, bounces=2, edges=True, **options).report.plan
     assert plan["waves beside edges, between reflections"].startswith(words)
+
+
+def test_a_corner_of_sheets_loses_as_much_as_one_of_walls():
+    """The folds of sheets are wedges on their backs, and diffract there; in the corner they are no edges."""
+    x, y, z = 3 * np.eye(3)
+    quads = np.array([[0 * x, a, a + b, b] for a, b in ((x, y), (y, z), (z, x))])
+    triangles, amplitudes = quads[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3, 3), []
+    for two_sided in (False, True):
+        scene = sarcl.Scene.facets(triangles, two_sided=two_sided)
+        options = {"polarization": ("HH", "VV"), "tolerance": 1e-2, "edges": True}
+        one, three = (np.ravel(sarcl.rcs(scene, 0.8, 0.6, F, bounces=n, **options)) for n in (1, 3))
+        amplitudes.append(three - one)
+    assert np.allclose(*amplitudes, rtol=1e-3)
