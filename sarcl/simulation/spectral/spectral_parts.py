@@ -119,7 +119,10 @@ def plan_parts(task: SpectralTask, request: EchoRequest, time: PlanningTime | No
     channel = None
     if direct is not None:
         channel = direct.channel(seen.antennas, seen.waveform, task.frequencies)
-        terms.append(ErrorTerm("facets added pulse by pulse", channel.predicted_error, SMALLER_TOLERANCE))
+        # other facets than those that are transformed: both errors are relative to norms whose squares add up
+        error = max([channel.predicted_error, *(term.value for term in terms if term.name == "facets")])
+        terms = [term for term in terms if term.name != "facets"]
+        terms.append(ErrorTerm("facets", error, SMALLER_TOLERANCE))
     request.clock.lap("plan")
     return PlannedParts(task, scene, prepared, parts, channel, tuple(terms))
 

@@ -141,6 +141,14 @@ def test_shadows_that_move_along_the_track(device, unshadowed):
     assert np.linalg.norm(raw.samples - unshadowed.samples) > 0.1 * np.linalg.norm(raw.samples)
 
 
+def test_facets_that_are_transformed_and_others_share_one_bound(device):
+    """Of half the track, where their bounds were added in squares: 3.2e-2 was predicted for 3e-2."""
+    options = {"tolerance": 3e-2, "device": device, "check": True}
+    raw = sarcl.spectral_echo(box_on_rough_ground(), GROUND_CHIRP, GROUND_TRACK.picked(slice(160, 480)), **options)
+    assert raw.report.plan["partly lit facets"] > 0 and [term.name for term in raw.report.error_terms] == ["facets"]
+    assert raw.report.measured_error <= raw.report.predicted_error <= 3e-2
+
+
 def test_a_box_on_rough_ground_adds_up_in_phase_and_so_do_its_errors(device, unshadowed):
     """Averaged over both, the rough ground hid them: 11 % where 2 % were predicted."""
     options = {"tolerance": 1e-3, "shadows": False, "device": device}
